@@ -51,7 +51,7 @@ fn a_first_flight_goes_as_its_page_says() {
     // A busy machine may leave the radio silent for a second, which holds the countdown: then it is
     // started again, and armed, if nobody started it for long.
     while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
-        if screen.window().shows(" disarmed On the pad") {
+        if screen.window().shows(" disarmed PAD_IDLE") {
             screen.type_until(b"AARM\r", " ARMED ");
         }
         screen.type_by_hand(b"SSTART\r");

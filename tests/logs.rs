@@ -1,8 +1,9 @@
 //! Logs with flipped bits, killed recorders and other CPUs.
 
 use std::path::Path;
+use std::process::Command;
 
-use e2e::{Ended, Program, Running, Signal, frames_of, program};
+use e2e::{Bound, Ended, Program, Running, Signal, frames_of, program};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 
@@ -94,4 +95,32 @@ fn a_file_that_is_no_log_is_refused_by_name() {
         "{}",
         refused.output
     );
+}
+
+/// By default, a write beyond the limit ends a program without a word.
+#[test]
+fn a_limit_of_the_file_size_ends_the_log_and_not_the_flight() {
+    let folder = tempfile::tempdir().unwrap();
+    let limited = |command: &Command| {
+        let mut shell = Command::new("bash");
+        shell.args(["-c", "ulimit -f 2000; exec \"$@\"", "bash"]).arg(command.get_program());
+        shell.args(command.get_args()).current_dir(folder.path());
+        shell
+    };
+    let mut flight = program(Program::OnboardSim);
+    flight.args(["fly", "--start", "pad", "--seed", "3", "--speed", "max", "--log", "flight.mcap"]);
+    let flown = Running::to_end(&mut limited(&flight));
+    assert_eq!(flown.code, Some(1), "{}", flown.output);
+    for words in ["its legs", "flight.mcap", "its log is incomplete"] {
+        assert!(flown.output.contains(words), "{words}: {}", flown.output);
+    }
+    let mut vehicle = program(Program::OnboardSim);
+    vehicle.args(["fly", "--start", "pad", "--speed", "1", "--mavlink", "udpin:127.0.0.1:0"]);
+    let mut vehicle = Running::start(&mut vehicle);
+    let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));
+    let mut station = program(Program::Ground);
+    station.args(["--auto", "--connect", &link, "--log", "station.mcap"]);
+    let station = Running::to_end(&mut limited(&station));
+    assert!(station.output.contains("LOG FAILED") && station.code.is_some(), "{}", station.output);
+    assert!(station.output.contains("its legs"), "to the end: {}", station.output);
 }

@@ -56,8 +56,9 @@ fn a_vehicle_takes_no_command_for_another_boot_or_for_everybody_but_an_abort() {
     assert_eq!(ground.command_with(everybody.clone()), DENIED);
     assert_eq!(ground.command_with(command(ARM, 1.0, 4242.0)), ACCEPTED);
     assert_eq!(ground.command_with(command(START, 0.0, 4243.0)), DENIED);
-    // Clients that name no boot, and every component of the system.
-    let start = COMMAND_LONG_DATA { target_component: 0, ..command(START, 0.0, 0.0) };
+    assert_eq!(ground.command_with(command(START, 0.0, 0.0)), DENIED);
+    // Clients that name every component of the system.
+    let start = COMMAND_LONG_DATA { target_component: 0, ..command(START, 0.0, 4242.0) };
     assert_eq!(ground.command_with(start), ACCEPTED);
     let status = ground.wait_for_status("a countdown", |status| status.countdown_ms != i32::MAX);
     assert_eq!((status.boot_number, status.last_hold_ds), (4242, 20));
@@ -83,8 +84,8 @@ fn the_death_of_the_station_that_armed_holds_whoever_else_has_its_ids() {
         let mut first = station(&mut vehicle, sessions[0]);
         let mut second = station(&mut vehicle, sessions[1]);
         first.wait_until_ready();
-        assert_eq!(first.command(ARM, 1.0), ACCEPTED);
-        assert_eq!(first.command(START, 0.0), ACCEPTED);
+        assert_eq!(first.command_with(command(ARM, 1.0, 4242.0)), ACCEPTED);
+        assert_eq!(first.command_with(command(START, 0.0, 4242.0)), ACCEPTED);
         // From now on only the second one speaks.
         second.wait_for_status("a countdown", |status| status.countdown_ms != i32::MAX);
         let held = second.wait_for_status("a hold", |status| {

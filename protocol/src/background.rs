@@ -11,6 +11,20 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+/// Signal whose default action ends a program that writes beyond a limit of the file size
+/// (`ulimit -f`). The same number on every Linux, except on MIPS.
+const SIGXFSZ: i32 = 25;
+
+/// Lets a write beyond a limit of the file size fail instead of ending the program. Called in a
+/// Tokio runtime.
+///
+/// # Errors
+/// The system refuses.
+pub fn survive_file_size_limit() -> io::Result<()> {
+    use tokio::signal::unix::{SignalKind, signal};
+    signal(SignalKind::from_raw(SIGXFSZ)).map(drop)
+}
+
 /// Maximum number of jobs that wait, and of outcomes that are unread.
 const WAITING_MAX: usize = 64;
 /// How long the last jobs may take at the end of the program.

@@ -39,7 +39,7 @@ pub enum KeyFileError {
     #[error("key file {path}: mode {mode:03o} gives other users access to the key; run `chmod 600 {path}`")]
     Permissions { path: PathBuf, mode: u32 },
     /// It does not contain a key.
-    #[error("key file {path}: must be 64 hexadecimal digits; `onboard-sim keygen` makes a key")]
+    #[error("key file {path}: must be 64 hexadecimal digits, not all 0; `onboard-sim keygen` makes a key")]
     NoKey { path: PathBuf },
     /// The timestamps beside it cannot be parsed. Starting without them would make a replay
     /// possible.
@@ -135,7 +135,8 @@ impl KeyFile {
             io::ErrorKind::InvalidData => no_key(),
             _ => failed(error),
         })?;
-        Key::from_hex(text.trim_end()).ok_or_else(no_key)
+        let is_drawn = |key: &Key| key.secret() != &[0; Key::LEN];
+        Key::from_hex(text.trim_end()).filter(is_drawn).ok_or_else(no_key)
     }
 
     /// Stores timestamps, so that they survive this process however it ends. It is cheap enough to

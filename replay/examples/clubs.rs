@@ -1,4 +1,4 @@
-//! How often GO of `replay fit --flights` means at least the landing rate that was asked for.
+//! How often GO of `replay fit --flights` means at least the requested landing rate.
 //!
 //! `cargo run --release -p replay --example clubs -- MISSION FLIGHTS SEED`
 //!
@@ -33,7 +33,7 @@ const NEAREST: usize = 40;
 const CLUBS: u64 = 500;
 /// Simulated flights of a club's day, and flights that its true rate is taken over.
 const DAY: usize = 1000;
-/// The risk that `replay fit` takes unless it is told another.
+/// The risk that `replay fit` takes by default.
 const RISK: f64 = 0.1;
 const LIMITS: [f64; 6] = [0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
 

@@ -121,11 +121,11 @@ fn print_coverage(tallies: &Tallies) -> anyhow::Result<()> {
 }
 
 /// What share of the intervals must hold the truth, in each set: 95 % where the world is not the
-/// model's, and nearly as often where it also does what nobody had thought of.
+/// model's, and nearly as often where the world also has effects without a model.
 const HOLD: [f64; 2] = [0.95, 0.9];
-/// An interval that holds more often than this says less than was found.
+/// An interval that holds more often than this is too wide.
 const TOO_WIDE: f64 = 0.985;
-/// Fewer flights of a set tell nothing of a share of 95 %.
+/// Fewest flights of a set to estimate a share of 95 %.
 const FEWEST: usize = 20;
 
 fn write_table(file: &str, flights: u64, seed: u64) -> anyhow::Result<()> {

@@ -22,7 +22,7 @@ pub(crate) fn worse(one: Exit, other: Exit) -> Exit {
 
 /// What a command has found: data for programs, sentences for people.
 pub trait Answer: Serialize {
-    /// What it says, a line each.
+    /// The answer as lines of text.
     fn sentences(&self) -> Vec<String>;
 
     fn outcome(&self) -> Exit {
@@ -34,11 +34,11 @@ pub trait Answer: Serialize {
 impl<One: Answer> Answer for Vec<One> {
     fn sentences(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        for said in self.iter().map(Answer::sentences) {
-            if said.len() > 1 && !lines.is_empty() {
+        for sentences in self.iter().map(Answer::sentences) {
+            if sentences.len() > 1 && !lines.is_empty() {
                 lines.push(String::new());
             }
-            lines.extend(said);
+            lines.extend(sentences);
         }
         lines
     }
@@ -86,8 +86,8 @@ pub(crate) fn give_each<A: Answer>(
 }
 
 /// The logs of a directory, in subdirectories, too. Each regular file counts once, however many
-/// links lead to it; what has the name of a log and is no file (a pipe, a link to nothing) is never
-/// opened, and is told.
+/// links lead to it. A name of a log that is no regular file (a pipe, a broken link) is reported and
+/// never opened.
 pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
     let (mut seen, mut logs, mut left) =
         (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));
@@ -100,8 +100,7 @@ pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
                 let mut entries = entries.with_context(failed)?;
                 entries.sort_by_key(DirEntry::path);
                 for entry in entries {
-                    // What is itself here comes before what only leads here, so that it keeps its
-                    // name.
+                    // Files come before links to them, so that a file is listed under its name.
                     let is_link = entry.path().is_symlink();
                     if is_link { left.push_front(entry.path()) } else { left.push_back(entry.path()) }
                 }
@@ -109,7 +108,7 @@ pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
             Ok(found) if found.is_dir() => {}
             Ok(found) if is_wanted && found.is_file() && seen.insert(path.canonicalize()?) => logs.push(path),
             Err(error) if path == directory => return Err(error).with_context(failed),
-            _ if is_wanted => say(&format!("left out: {}: no file, or here already", path.display())),
+            _ if is_wanted => print_note(&format!("left out: {}: no file, or here already", path.display())),
             _ => {}
         }
     }
@@ -132,8 +131,8 @@ fn harmless(text: &[u8]) -> String {
     text.chars().map(|c| if steers(&c) { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
-/// Says on standard error what is no error, unless --quiet is given.
-pub(crate) fn say(text: &str) {
+/// Writes a note to standard error, unless --quiet is given.
+pub(crate) fn print_note(text: &str) {
     if !is_quiet() {
         print_error(text);
     }
@@ -148,7 +147,7 @@ pub fn print_error(text: &str) {
 pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
     if let Some(Gap { after, before }) = recording.gap() {
         let name = &recording.name;
-        say(&format!(
+        print_note(&format!(
             "warning: {name}: after frame {after} comes frame {before}; nothing after the gap was run again"
         ));
     }
@@ -158,10 +157,10 @@ pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
 /// Warns of a log that is damaged, and of a flight that was not recorded to its end.
 pub(crate) fn warn_of_loss(file: &str, damage: Option<&str>, cut: Option<&Cut>) {
     if let Some(damage) = damage {
-        say(&format!("warning: {file} is damaged: {damage}; what can be read was used"));
+        print_note(&format!("warning: {file} is damaged: {damage}; what can be read was used"));
     }
     if let Some(cut) = cut {
-        say(&format!("warning: {file}: the flight {cut}"));
+        print_note(&format!("warning: {file}: the flight {cut}"));
     }
 }
 

@@ -35,7 +35,7 @@ pub enum AgainError {
     Flight(#[from] SetUpError),
     #[error("{name}: no frame {frame} that can be re-executed; there are {first} to {last}")]
     NoFrame { name: String, frame: u64, first: u64, last: u64 },
-    /// What is asked for cannot be had: `of` is the file or the setting.
+    /// The request cannot be met: `of` is the file or the setting.
     #[error("{of}: {reason}")]
     Refused { of: String, reason: String },
 }

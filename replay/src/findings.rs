@@ -36,7 +36,7 @@ impl Finding {
 /// Findings of a recorded flight, first in time.
 ///
 /// # Errors
-/// The reason why nothing was looked for.
+/// The reason why no findings were computed.
 pub(crate) fn of(
     recording: &Recording,
     verdict: Option<&Verdict>,
@@ -140,9 +140,15 @@ pub(crate) const FINS: [&str; 4] = ["fin-1", "fin-2", "fin-3", "fin-4"];
 
 fn picture(sign: Sign) -> &'static str {
     match sign {
-        Sign::Gnss | Sign::Barometer | Sign::Lidar | Sign::Accelerometer | Sign::HeightsDisagree => {
-            "test-ratio"
-        }
+        Sign::Gnss
+        | Sign::Barometer
+        | Sign::Lidar
+        | Sign::Implausible(_)
+        | Sign::Repeats(_)
+        | Sign::Jumps(_)
+        | Sign::Biased(_)
+        | Sign::HeightsDisagree
+        | Sign::RangesDisagree => "test-ratio",
         Sign::Estimate => "standard-deviations",
         Sign::Battery => "battery-voltage",
         Sign::Surface(0) | Sign::SlowGimbal => "gimbal-pitch",

@@ -5,8 +5,8 @@
 //! In reading order:
 //!
 //! * [`Cli`] and [`cli`]: the command line. A command is one file with its arguments and its answer
-//!   ([`cli::Answer`]: data, and what it says), and its line here.
-//! * [`log`]: opens a log and streams its records in bounded memory, or holds a whole flight.
+//!   ([`cli::Answer`]: data and text), and its line here.
+//! * [`log`]: opens a log and streams its records in bounded memory, or holds one flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
 //! * [`findings`]: what went wrong in a flight, first in time.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
@@ -16,8 +16,8 @@
 //! * [`evaluate`](mod@evaluate): runs the controller alone with other settings on recorded inputs
 //!   (open loop).
 //! * [`refly`](mod@refly): flies the flight again in simulation from a chosen moment (closed loop).
-//! * [`fit`](mod@fit): what a flight tells of its vehicle, its motor and its day, with intervals;
-//!   what all flights so far tell of the next day.
+//! * [`fit`](mod@fit): estimates vehicle, motor and weather from flights, with intervals, and
+//!   predicts the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.

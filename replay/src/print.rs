@@ -84,7 +84,7 @@ pub(crate) fn limits_of_both(both: [Option<&Verdict>; 2]) -> Vec<(f64, [String; 
         let apart = match found {
             // The larger of it and of no number, which is 0 over 0.
             [Some(then), Some(now)] => ((then.value - now.value).abs() / range).max(0.0),
-            // Of what only happens or does not, only what happened is told; a value may be unknown.
+            // An event without a range is listed only if it happened; a value may be unknown.
             _ if range > 0.0 => 0.0,
             _ => f64::INFINITY,
         };

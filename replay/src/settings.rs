@@ -101,7 +101,7 @@ pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Settin
     })?;
     let mut settings = Vec::new();
     collect_leaves("", &table, &mut |path, value| {
-        settings.push(Setting { path, value: as_whole(value), at_s: None });
+        settings.push(Setting { path, value: as_integer(value), at_s: None });
     });
     Ok(settings)
 }
@@ -135,7 +135,7 @@ pub fn mission_with(mission_toml: &str, settings: &[Setting]) -> Result<Mission,
             return SettingError::Toml { origin: "the mission".to_owned(), reason };
         }
         let recorded = mission_toml.parse().unwrap_or_default();
-        refusal(&reason, settings, &known_keys(&recorded))
+        refusal(&reason, settings, &valid_keys(&recorded))
     })
 }
 
@@ -157,7 +157,7 @@ pub(crate) fn mission_toml_with_reasons(
     let not_toml = |error: toml_edit::TomlError| wrong(error.to_string());
     let mut document: toml_edit::DocumentMut = mission_toml.parse().map_err(not_toml)?;
     for (Setting { path, value, .. }, comment) in settings {
-        let mut value: toml_edit::Value = as_whole(value).to_string().parse().map_err(not_toml)?;
+        let mut value: toml_edit::Value = as_integer(value).to_string().parse().map_err(not_toml)?;
         if !comment.is_empty() {
             value.decor_mut().set_suffix(format!(" # {comment}"));
         }
@@ -195,14 +195,14 @@ pub fn truth_with(truth: &Truth, settings: &[Setting]) -> Result<Truth, SettingE
 
 /// A whole number of a range, `10.0`, as `10`: a key that takes whole numbers takes it, and so does
 /// one that takes all.
-fn as_whole(value: &toml::Value) -> toml::Value {
-    let whole = value.as_float().map(|number| (number, libm::trunc(number) as i64));
-    let same = whole.filter(|(number, whole)| (*whole as f64).to_bits() == number.to_bits());
-    same.map_or_else(|| value.clone(), |(_, whole)| toml::Value::Integer(whole))
+fn as_integer(value: &toml::Value) -> toml::Value {
+    let integer = value.as_float().map(|number| (number, libm::trunc(number) as i64));
+    let same = integer.filter(|(number, integer)| (*integer as f64).to_bits() == number.to_bits());
+    same.map_or_else(|| value.clone(), |(_, integer)| toml::Value::Integer(integer))
 }
 
 /// Every key of the built-in missions and their controller, and of this table.
-fn known_keys(table: &toml::Table) -> BTreeSet<String> {
+fn valid_keys(table: &toml::Table) -> BTreeSet<String> {
     let built_in = flight::vehicles::mission::BUILTIN.iter().filter_map(|(name, text)| {
         let mission = flight::vehicles::mission::from_toml(text, name).ok()?;
         toml::Table::try_from(mission).ok()
@@ -332,14 +332,14 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_number_may_be_written_as_a_real_one_and_a_fraction_is_refused() {
+    fn an_integer_may_be_written_as_a_real_number_and_a_fraction_is_refused() {
         assert_eq!(with(&["powered.solver.max_iterations=12.0"]).unwrap().powered.solver.max_iterations, 12);
         let refusal = with(&["powered.solver.max_iterations=12.5"]).unwrap_err().to_string();
         assert!(refusal.contains("max_iterations=12.5") && refusal.contains("12.5"), "{refusal}");
     }
 
     #[test]
-    fn the_truth_is_set_by_its_own_names() {
+    fn the_truth_is_set_by_the_names_of_its_section() {
         let set = |given: &str| truth_with(&Truth::default(), &[given.parse().unwrap()]);
         let expected = Truth { wind_m_s: 4.0, ..Truth::default() };
         assert_eq!(set("truth.wind_m_s=4").unwrap(), expected);

@@ -125,7 +125,7 @@ impl Field {
         for terminal in [&*screen, &*watching, &*distant] {
             terminal.wait_until("a vehicle that is down", |window| {
                 let rows = window.rows();
-                (rows[1].contains("On the ground") || rows[1].contains("Flight over")).then_some(())
+                (rows[1].contains("TOUCHDOWN") || rows[1].contains("SAFED")).then_some(())
             });
         }
         // The verdict comes every 2 s.

@@ -31,7 +31,7 @@ fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_s
         // the link lost.
         shown.wait_until("the abort, by the second station", |window| {
             let rows = window.rows();
-            let heard = rows[0].contains(" down 0s up 0s") && rows[1].contains(" On the pad ");
+            let heard = rows[0].contains(" down 0s up 0s") && rows[1].contains(" PAD_IDLE ");
             (heard && rows[2].contains("acknowledged accepted  observed yes")).then_some(())
         });
     }

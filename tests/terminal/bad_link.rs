@@ -20,7 +20,7 @@ const BAD: Impairment = Impairment {
 #[test]
 fn with_heavy_loss_arming_works_and_the_abort_arrives() {
     let mut rig = Rig::new("mk2");
-    rig.terminal.wait_for("On the pad");
+    rig.terminal.wait_for("PAD_IDLE");
     rig.proxy.impair(BAD);
     let climbed = rig.arm();
     assert!(

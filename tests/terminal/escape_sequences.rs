@@ -117,7 +117,7 @@ fn wait_for_newest(rig: &Rig, page: &str, word: &str) {
     rig.terminal.wait_until(&format!("{word} on {page}"), |window| {
         let rows = window.rows();
         let said = rows[rows.len() - 2].contains(word);
-        (said && rows[rows.len() - 1].contains(page) && rows[1].contains("On the pad")).then_some(())
+        (said && rows[rows.len() - 1].contains(page) && rows[1].contains("PAD_IDLE")).then_some(())
     });
 }
 

@@ -17,3 +17,4 @@ mod rig;
 mod stalled_disk;
 mod standstill;
 mod stations;
+mod tmux;

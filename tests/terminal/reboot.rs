@@ -9,13 +9,13 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
-    rig.terminal.wait_for("Falling");
+    rig.terminal.wait_for("AERO_DESCENT");
     let (arms, starts) = (rig.sent(ARM, 1.0), rig.sent(START, 0.0));
     rig.reboot_vehicle();
     rig.terminal.wait_for("the vehicle has REBOOTED");
     rig.terminal.wait_until("a pad and nothing armed", |window| {
         let top = window.rows()[..2].concat();
-        (top.contains(" On the pad ") && top.contains(" disarmed ") && top.contains(" down 0s up 0s"))
+        (top.contains(" PAD_IDLE ") && top.contains(" disarmed ") && top.contains(" down 0s up 0s"))
             .then_some(())
     });
     // What was known before the reboot is gone: the flight, and commands that were waiting.
@@ -30,7 +30,7 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     // Commands work again.
     rig.arm();
     rig.start();
-    rig.terminal.wait_for("Falling");
+    rig.terminal.wait_for("AERO_DESCENT");
     rig.abort();
     rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     rig.terminal.signal(Signal::SIGTERM);
@@ -138,7 +138,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
         station.wait_for("✓ armed, says HEARTBEAT");
         station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
-        station.wait_for("Falling");
+        station.wait_for("AERO_DESCENT");
     };
     fly(&mut station, &mut first);
     first.signal(Signal::SIGKILL);
@@ -148,7 +148,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
     station.wait_for("the vehicle has REBOOTED");
     station.wait_until("a disarmed pad", |window| {
         let top = window.rows().swap_remove(1);
-        (top.contains(" On the pad ") && top.contains(" disarmed ")).then_some(())
+        (top.contains(" PAD_IDLE ") && top.contains(" disarmed ")).then_some(())
     });
     fly(&mut station, &mut second);
     second.signal(Signal::SIGTERM);

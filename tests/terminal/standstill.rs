@@ -21,7 +21,7 @@ fn what_waited_while_the_station_stood_still_is_in_the_log_and_not_on_the_screen
     daemon.wait_for_line("what waited is in the log only");
     screen.wait_until("a vehicle that is down", |window| {
         let row = window.rows().swap_remove(1);
-        (row.contains("On the ground") || row.contains("Flight over")).then_some(())
+        (row.contains("TOUCHDOWN") || row.contains("SAFED")).then_some(())
     });
     daemon.signal(Signal::SIGTERM);
     let output = daemon.wait().output;

@@ -44,7 +44,7 @@ fn ground_without_arguments_beside_a_station_is_the_demonstration() {
     demonstration.wait_for("press A, type ARM");
     demonstration.type_until(b"AARM\r", " ARMED ");
     demonstration.type_until(b"SSTART\r", "START  commanded");
-    demonstration.wait_for("Falling");
+    demonstration.wait_for("AERO_DESCENT");
     assert!(station.pad.proxy.commands().is_empty(), "the real vehicle was commanded");
     demonstration.signal(Signal::SIGTERM);
     demonstration.wait_for_end();

@@ -6,19 +6,26 @@
 //! may be reading. crossterm drops such an answer without a word. So this stands between the
 //! terminal and crossterm: a thread reads the terminal, and passes on everything else over a
 //! pseudo-terminal, which crossterm takes for standard input.
+//!
+//! tmux answers by itself, also while it shows the past of the pane (copy mode), which takes the
+//! keys, or another window. So a second thread queries tmux whether it shows this pane.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io;
 use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt as _;
-use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
+
+use super::clock::since_boot;
 
 /// Device status report (ECMA-48, 8.3.35), which every terminal answers.
 pub(super) const QUESTION: &[u8] = b"\x1b[5n";
@@ -29,10 +36,20 @@ const REST_WITHIN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 const LAST_WITHIN: Duration = Duration::from_millis(500);
 const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(2);
 
-/// Answers that nobody has taken note of yet, and questions without an answer. There is only one
-/// terminal.
-static ANSWERS: AtomicU32 = AtomicU32::new(0);
+/// Interval of the queries to tmux: with the silence after which a screen does not count, less than
+/// a second.
+const QUERY_TMUX_EVERY: Duration = Duration::from_millis(100);
+/// Modes of the pane, clients of its session, whether its window is shown, whether another pane
+/// hides it.
+const TMUX_FORMAT: &str =
+    "#{pane_in_mode} #{session_attached} #{window_active} #{&&:#{window_zoomed_flag},#{!=:#{pane_active},1}}";
+
+/// When the last answer arrived that no one has taken note of, and questions without an answer.
+/// There is only one terminal.
+static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
+/// tmux reports that it does not show the screen.
+static HIDDEN: AtomicBool = AtomicBool::new(false);
 
 /// What standard input was, and our end of the pseudo-terminal that replaces it.
 static REPLACED: Mutex<Option<(OwnedFd, File)>> = Mutex::new(None);
@@ -42,9 +59,15 @@ pub(super) fn note_question() {
     OPEN_QUESTIONS.fetch_add(1, Ordering::Relaxed);
 }
 
-/// Whether the terminal has answered since the last call.
-pub(super) fn has_answered() -> bool {
-    ANSWERS.swap(0, Ordering::Relaxed) > 0
+/// How long ago the terminal answered, if it has since the last call.
+pub(super) fn answered_ago() -> Option<Duration> {
+    let at = ANSWERED.lock().unwrap_or_else(PoisonError::into_inner).take()?;
+    Some(since_boot().saturating_sub(at))
+}
+
+/// Whether tmux shows another thing than this screen, or takes its keys.
+pub(super) fn is_hidden() -> bool {
+    HIDDEN.load(Ordering::Relaxed)
 }
 
 /// Begins to stand between the terminal, which is in raw mode already, and crossterm, which has
@@ -69,6 +92,10 @@ pub(super) fn begin() -> io::Result<()> {
     rustix::stdio::dup2_stdin(&crossterms)?;
     let ours = File::from(ours);
     *replaced() = Some((stdin, ours.try_clone()?));
+    if let (Some(_), Some(pane)) = (std::env::var_os("TMUX"), std::env::var_os("TMUX_PANE")) {
+        let query = move || query_tmux(&pane);
+        std::thread::Builder::new().name("tmux".to_owned()).spawn(query)?;
+    }
     let pass = move || pass_on(&typed, &ours);
     std::thread::Builder::new().name("keyboard".to_owned()).spawn(pass).map(drop)
 }
@@ -113,6 +140,25 @@ fn pass_on(mut typed: &File, mut ours: &File) {
     }
 }
 
+/// Queries tmux until the screen ends. Without an answer the screen counts as shown.
+fn query_tmux(pane: &OsStr) {
+    while replaced().is_some() {
+        let mut tmux = Command::new("tmux");
+        tmux.args(["display-message", "-p", "-t"]).arg(pane).arg(TMUX_FORMAT).stdin(Stdio::null());
+        let is_hidden = tmux.output().is_ok_and(|output| does_tmux_hide(&output.stdout));
+        HIDDEN.store(is_hidden, Ordering::Relaxed);
+        std::thread::sleep(QUERY_TMUX_EVERY);
+    }
+}
+
+/// Whether an answer in [`TMUX_FORMAT`] shows that the pane is not shown, or takes no keys.
+fn does_tmux_hide(answer: &[u8]) -> bool {
+    let words = str::from_utf8(answer).unwrap_or_default().split_whitespace();
+    let numbers: Vec<u32> = words.filter_map(|word| word.parse().ok()).collect();
+    let [modes, clients, is_window_shown, is_covered] = numbers[..] else { return false };
+    modes > 0 || clients == 0 || is_window_shown == 0 || is_covered > 0
+}
+
 /// Takes the answers out of a stream of bytes.
 #[derive(Debug, Default)]
 struct Sieve {
@@ -135,7 +181,7 @@ impl Sieve {
             }
             if self.begun == ANSWER.len() {
                 self.begun = 0;
-                ANSWERS.fetch_add(1, Ordering::Relaxed);
+                *ANSWERED.lock().unwrap_or_else(PoisonError::into_inner) = Some(since_boot());
                 OPEN_QUESTIONS.fetch_sub(1, Ordering::Relaxed);
             }
         }
@@ -152,6 +198,16 @@ impl Sieve {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_pane_is_hidden_in_copy_mode_without_a_client_in_another_window_and_behind_a_zoomed_pane() {
+        for shown in [&b"0 1 1 0\n"[..], b"0 2 1 0\n", b"", b"no server running", b"0 1\n"] {
+            assert!(!does_tmux_hide(shown), "{shown:?}");
+        }
+        for hidden in [&b"1 1 1 0\n"[..], b"2 1 1 0\n", b"0 0 1 0\n", b"0 1 0 0\n", b"0 1 1 1\n"] {
+            assert!(does_tmux_hide(hidden), "{hidden:?}");
+        }
+    }
+
     /// However the bytes arrive, every key comes through and no answer does.
     #[test]
     fn answers_are_taken_out_of_what_is_typed() {
@@ -162,6 +218,6 @@ mod tests {
             keys.extend(sieve.give_up());
             assert_eq!(keys, b"a\x1b\x1b[Aq\x1b[0~\x1b\x1b[0", "{length}");
         }
-        assert!(has_answered() && !has_answered());
+        assert!(answered_ago().is_some() && answered_ago().is_none());
     }
 }

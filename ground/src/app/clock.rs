@@ -5,6 +5,7 @@ use std::task::Poll;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context as _;
+use protocol::background::survive_file_size_limit;
 use rustix::time::{ClockId, clock_gettime};
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
@@ -50,7 +51,7 @@ impl Clock {
 }
 
 /// A clock that goes on while the computer sleeps, as the vehicle's does.
-fn since_boot() -> Duration {
+pub(super) fn since_boot() -> Duration {
     #[cfg(target_os = "linux")]
     const CLOCK: ClockId = ClockId::Boottime;
     #[cfg(not(target_os = "linux"))]
@@ -85,9 +86,6 @@ fn nanoseconds(duration: Duration) -> u64 {
 
 /// POSIX.1-2017, `kill`: its number is the same everywhere.
 const SIGABRT: i32 = 6;
-/// Its number on Linux, except on MIPS. Its default action ends a program whose log reaches a limit
-/// of the file size (`ulimit -f`).
-const SIGXFSZ: i32 = 25;
 
 // Waits for the signals that end the program. None of them affects the vehicle.
 
@@ -103,9 +101,8 @@ impl Signals {
     pub fn listen() -> anyhow::Result<Self> {
         let listen =
             |kind, name| Ok::<_, anyhow::Error>((signal(kind).context("listening for signals")?, name));
-        // Once it is handled, the write fails instead: LOG FAILED, and the station continues.
-        let _handled =
-            signal(SignalKind::from_raw(SIGXFSZ)).context("handling the limit of the file size")?;
+        // The write fails instead: LOG FAILED, and the station continues.
+        survive_file_size_limit().context("handling the limit of the file size")?;
         Ok(Self([
             listen(SignalKind::interrupt(), "SIGINT")?,
             listen(SignalKind::terminate(), "SIGTERM")?,

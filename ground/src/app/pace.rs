@@ -1,5 +1,7 @@
-//! Decides when the screen is drawn: soon after an input, less often otherwise, and rarely enough
-//! for a slow line. Important changes are drawn at once in any case, but the pictures of a flight,
+//! Decides when the screen is drawn: soon after an input, and less often otherwise.
+//!
+//! A terminal that answers at once gets ten frames a second in flight. Over a slow line frames are
+//! limited in bytes. Important changes are drawn at once in any case, but the pictures of a flight,
 //! which are most of the bytes, once a second.
 
 use std::collections::VecDeque;
@@ -23,8 +25,19 @@ const FLIGHT_FRAME: Duration = Duration::from_millis(200);
 const CALM_FRAME: Duration = Duration::from_millis(500);
 /// The longest time between two frames, because ages grow even if nothing arrives.
 const IDLE_FRAME: Duration = Duration::from_secs(1);
-/// The shortest time between two drawings of the pictures of a flight.
+/// The shortest time between two drawings of the pictures of a flight over a slow line.
 const PICTURES: Duration = Duration::from_secs(1);
+
+/// A terminal that answers within this time is fast, if it had to take so many bytes just before: a
+/// line of 2 kB/s takes 100 ms for them.
+const FAST: Duration = Duration::from_millis(50);
+/// A fast terminal is slow once an answer takes this long. Below it, a busy computer is more likely
+/// than a slow line.
+const SLOW: Duration = Duration::from_millis(150);
+/// The shortest time between two frames in flight on a fast terminal: no tenth of a second of the
+/// clock is left out.
+const FAST_FRAME: Duration = Duration::from_millis(90);
+const FAST_BYTES: usize = 200;
 
 /// While the terminal has not taken what was written so long ago, nothing new is drawn: it would be
 /// seen late.
@@ -91,11 +104,27 @@ pub struct Pace {
     /// When the terminal was asked, if it has not answered yet; and how long its last answer took.
     asked: Option<Duration>,
     took: Option<Duration>,
+    /// Bytes of the frame that was written with the open question.
+    asked_bytes: usize,
+    /// Whether the terminal takes a frame as soon as it is written.
+    is_fast: bool,
+    /// Answers show nothing about the line.
+    never_fast: bool,
     /// The frames of the last second: when they were drawn, and their bytes.
     written: VecDeque<(Duration, usize)>,
 }
 
 impl Pace {
+    /// `never_fast` if answers show nothing about the line.
+    pub fn new(never_fast: bool) -> Self {
+        Self { never_fast, ..Self::default() }
+    }
+
+    /// Whether the terminal is still late with its answer: then it is slow.
+    pub fn check_answer(&mut self, now: Duration) {
+        self.is_fast &= self.waits(now).is_none_or(|waits| waits <= SLOW);
+    }
+
     /// A person has done something and waits for the result.
     pub fn mark_changed(&mut self) {
         self.mark_urgent();
@@ -143,7 +172,10 @@ impl Pace {
     ) -> Result<CompletedFrame<'t>, B::Error> {
         terminal.draw(|frame| {
             let place = view::draw(model, theme, model_now, frame).map(|area| (model.page(), area));
-            let waits = |before: &Pictures| Some(before.place) == place && now < before.drawn_at + PICTURES;
+            let is_fast = self.is_fast;
+            let waits = |before: &Pictures| {
+                !is_fast && Some(before.place) == place && now < before.drawn_at + PICTURES
+            };
             self.pictures = match self.pictures.take().filter(|before| !self.whole && waits(before)) {
                 Some(before) => {
                     frame.buffer_mut().merge(&before.cells);
@@ -162,7 +194,7 @@ impl Pace {
     pub fn redraw_at(&self) -> Duration {
         let Some(drawn_at) = self.drawn_at else { return Duration::ZERO };
         let due = drawn_at + self.wait;
-        if self.urgent { due } else { due.max(self.room_at()) }
+        if self.urgent || self.is_fast { due } else { due.max(self.room_at()) }
     }
 
     /// When the line has room for another frame.
@@ -185,13 +217,21 @@ impl Pace {
     /// a time, so that a lost answer is only lost.
     pub fn asks(&mut self, now: Duration) -> bool {
         let asks = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
-        self.asked = if asks { Some(now) } else { self.asked };
+        if asks {
+            self.asked = Some(now);
+            let with_it = self.written.back().filter(|(at, _)| *at == now);
+            self.asked_bytes = with_it.map_or(0, |(_, bytes)| *bytes);
+        }
         asks
     }
 
     /// The terminal has answered.
     pub fn answered(&mut self, now: Duration) {
-        self.took = Some(self.waits(now).unwrap_or(Duration::ZERO));
+        let took = self.waits(now).unwrap_or(Duration::ZERO);
+        // A few bytes pass any line quickly.
+        let is_proven = self.asked.is_some() && self.asked_bytes >= FAST_BYTES && took <= FAST;
+        self.is_fast = took <= SLOW && (self.is_fast || is_proven && !self.never_fast);
+        self.took = Some(took);
         self.asked = None;
     }
 
@@ -220,6 +260,9 @@ impl Pace {
         (self.urgent, self.whole) = (false, false);
         self.drawn = Some(Urgent::of(model));
         self.cells = cells;
+        if self.is_fast && (model.vehicle.in_flight() || model.vehicle.counts_down()) {
+            self.wait = FAST_FRAME;
+        }
         self.written.push_back((now, bytes));
         while self.written.front().is_some_and(|(at, _)| *at + WINDOW <= now) {
             self.written.pop_front();

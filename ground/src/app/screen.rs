@@ -44,6 +44,9 @@ const QUIET_FOR: Duration = Duration::from_millis(50);
 /// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
 
+/// The smallest screen that counts, columns and rows: it has room for an alarm and the keys.
+const LEAST: (u16, u16) = (20, 5);
+
 /// How often the terminal is asked whether it answers.
 const ASK_EVERY: Duration = Duration::from_millis(250);
 
@@ -73,6 +76,8 @@ pub struct Screen {
     waiting: Option<Msg>,
     input_ended: bool,
     ask_at: Duration,
+    /// The terminal has answered, and [`Self::answers`] has not said so yet.
+    has_answered: bool,
 }
 
 impl Screen {
@@ -94,11 +99,12 @@ impl Screen {
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
             voice,
-            pace: Pace::default(),
+            pace: Pace::new(is_answered_by_another()),
             whole: false,
             waiting: None,
             input_ended: false,
             ask_at: Duration::ZERO,
+            has_answered: false,
         })
     }
 
@@ -107,6 +113,7 @@ impl Screen {
     /// # Errors
     /// The terminal cannot be written.
     pub fn show(&mut self, model: &Model, now: Duration, model_now: Duration) -> io::Result<()> {
+        self.take_answer(now);
         self.pace.check_urgent(model);
         if now < self.pace.redraw_at() {
             return Ok(());
@@ -146,17 +153,23 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call. Asks it again if that is due, and if
-    /// it has taken what was written.
+    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again
+    /// if that is due, and if it has taken what was written.
     pub fn answers(&mut self, now: Duration) -> bool {
         if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
             self.ask(now);
         }
-        let has_answered = answers::has_answered();
-        if has_answered {
-            self.pace.answered(now);
+        self.take_answer(now);
+        let fits = self.terminal.size().is_ok_and(|size| size.width >= LEAST.0 && size.height >= LEAST.1);
+        std::mem::take(&mut self.has_answered) && fits && !answers::is_hidden()
+    }
+
+    fn take_answer(&mut self, now: Duration) {
+        if let Some(ago) = answers::answered_ago() {
+            self.pace.answered(now.saturating_sub(ago));
+            self.has_answered = true;
         }
-        has_answered
+        self.pace.check_answer(now);
     }
 
     /// Sends what was drawn, and asks behind it whether the terminal has taken it.
@@ -248,6 +261,13 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     backend.has_true_colour =
         std::env::var("COLORTERM").is_ok_and(|says| ["truecolor", "24bit"].contains(&says.as_str()));
     Ok((Terminal::new(backend)?, writer))
+}
+
+/// Whether a multiplexer at this end of an SSH session answers instead of the terminal: its answer
+/// shows nothing about the line behind it.
+fn is_answered_by_another() -> bool {
+    let is_set = |name: &&str| std::env::var_os(name).is_some();
+    ["TMUX", "STY"].iter().any(|name| is_set(&name)) && is_set(&"SSH_CONNECTION")
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

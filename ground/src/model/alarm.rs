@@ -30,6 +30,8 @@ pub enum AlarmKind {
     TwoVehicles,
     /// Another station uses our id.
     SameId,
+    /// A station that may not be of this crew has armed the vehicle or started its countdown.
+    OtherStation(CommandKind),
     /// The vehicle has another autopilot.
     Foreign,
     /// The vehicle acknowledged the command, but its own state does not show the effect.
@@ -58,6 +60,8 @@ pub enum AlarmKind {
     Held,
     /// The vehicle's battery is low.
     Battery,
+    /// In flight or after it, the vehicle has no satellite fix or no valid position.
+    Position,
     /// The vehicle does not write its log, or has no room for it.
     VehicleLog,
     /// The last check on the pad found something outside its limit.

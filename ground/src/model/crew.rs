@@ -76,7 +76,10 @@ impl Crew {
         };
         match &self.silent[..] {
             [] => there,
-            silent => format!("{there}; does not answer, so it does not count: {}", listed(silent)),
+            silent => format!(
+                "{there}; does not answer or is not shown (tmux), so it does not count: {}",
+                listed(silent)
+            ),
         }
     }
 }

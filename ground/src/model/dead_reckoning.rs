@@ -128,6 +128,15 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
     course
 }
 
+/// The same with the moments. After a loss of the link it begins where the vehicle was last
+/// heard, so that the predicted touchdown stands still.
+pub fn foreseen(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)> {
+    let heard_at = vehicle.best_motion().map(|motion| motion.received_at);
+    let from = heard_at.filter(|_| is_unheard(vehicle, now)).unwrap_or(now);
+    let points = course(vehicle, from).into_iter();
+    points.map(|(ahead_s, place)| (from + Duration::from_secs_f64(ahead_s), place)).collect()
+}
+
 /// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and
 /// has reached zero since. A hold or an abort in the silence is not known here.
 pub fn may_have_left(vehicle: &Vehicle, now: Duration) -> Option<Duration> {

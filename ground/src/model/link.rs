@@ -274,6 +274,12 @@ impl Uplink {
         }
     }
 
+    /// The other station that armed the vehicle, unless it holds a key of this crew, as a Touchdown
+    /// station on a signed link does.
+    pub(crate) fn unproven(&self, is_signed: bool) -> Option<Address> {
+        self.armed_by_other.filter(|_| !is_signed || self.other_session == 0)
+    }
+
     /// A TIMESYNC that was sent at this time was answered.
     pub(crate) fn answered(&mut self, asked_at: Duration) {
         self.answered_at = self.answered_at.max(Some(asked_at));

@@ -113,7 +113,7 @@ impl Model {
 
     /// Error of the position that the vehicle reports, m: its own accuracy, if that is worse than
     /// usual.
-    fn heard_error_m(&self) -> f64 {
+    pub(crate) fn heard_error_m(&self) -> f64 {
         let sigma_m = |status: Sample<ESTIMATOR_STATUS_DATA>| f64::from(status.value.pos_horiz_accuracy);
         self.vehicle.last().map_or(0.0, |status| WITHIN_95 * sigma_m(status)).max(HEARD_ERROR_M)
     }

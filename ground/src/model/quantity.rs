@@ -82,14 +82,16 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
     quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
     quantity("fin 4", "deg", 1, |m, _| fin(&m.vehicle, 3)),
-    quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m)),
+    quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m).filter(is_estimated)),
     quantity("time to apogee", "s", 1, |m, _| m.vehicle.of_descent(|d| d.time_to_apogee_s)),
     quantity("band low", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_low_m)),
     quantity("band high", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_high_m)),
     quantity("ignition height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.chosen_height_m)),
     quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
-    quantity("wind", "m/s", 1, |m, _| m.vehicle.of_descent(|d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s))),
+    quantity("wind", "m/s", 1, |m, _| {
+        m.vehicle.of_descent(|d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s)).filter(is_estimated)
+    }),
     quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_x_m)),
     quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_y_m)),
     quantity("drag", "x", 3, |m, _| m.vehicle.of_descent(|d| d.drag_scale)),
@@ -117,6 +119,11 @@ pub static ALL: [Quantity; COUNT] = [
     }),
     quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
+
+/// Exactly zero is sent for what is not estimated.
+fn is_estimated(sample: &Sample<f64>) -> bool {
+    sample.value != 0.0
+}
 
 fn link(model: &Model, now: Duration, pick: fn(&LinkFigures) -> f64) -> Option<Sample<f64>> {
     model.link.heard_at.map(|_| Sample::new(pick(&model.link.stats.figures(now)), now))

@@ -321,7 +321,8 @@ fn held_by(vehicle: &Vehicle) -> Option<String> {
 /// Why the countdown was held and what happens next; `None` while it is not held.
 pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
-    let theirs = || held_by(vehicle).unwrap_or_else(|| "its station".to_owned());
+    let theirs =
+        || held_by(vehicle).map_or_else(|| "its station".to_owned(), |who| format!("the station of {who}"));
     let whom = if armed_here { "this station".to_owned() } else { theirs() };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
@@ -409,7 +410,8 @@ impl Ending {
 
     /// The word with what is known of this end.
     pub fn sentence(self, vehicle: &Vehicle) -> String {
-        format!("{}{}", self.word(), self.detail(vehicle))
+        let reset = if vehicle.reset_in_flight { ", after a RESET IN FLIGHT" } else { "" };
+        format!("{}{reset}{}", self.word(), self.detail(vehicle))
     }
 
     /// What is known of this end: what follows the word.
@@ -556,7 +558,22 @@ fn abort_commanded_by(model: &Model) -> Option<String> {
     let ours = model.commands.of(CommandKind::Abort).map(|_| "commanded from here".to_owned());
     let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
     let named = texts.find_map(|event| event.text.strip_suffix(" aborts"));
-    ours.or_else(|| named.map(|sender| format!("commanded by {sender}")))
+    let words = |sender: &str| match sender.strip_prefix("station ") {
+        Some(ids) => format!("station {}", sender_words(model, ids)),
+        None => sender.to_owned(),
+    };
+    ours.or_else(|| named.map(|sender| format!("commanded by {}", words(sender))))
+}
+
+/// The ids of a station with the network address or link that the vehicle last reported for one of
+/// its commands.
+pub fn sender_words(model: &Model, ids: &str) -> String {
+    let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
+    let from = texts.find_map(|event| {
+        let (from, _) = event.text.strip_prefix(ids)?.rsplit_once(": ")?;
+        from.starts_with(' ').then_some(from)
+    });
+    format!("{ids}{}", from.unwrap_or_default())
 }
 
 /// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave

@@ -131,10 +131,18 @@ impl Vehicle {
 
     /// Whether it says that its own log does not run.
     pub fn log_has_stopped(&self) -> bool {
-        const LOG: MavSysStatusSensor = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
+        self.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING)
+    }
+
+    /// Whether it reports no satellite fix.
+    pub fn gnss_is_lost(&self) -> bool {
+        self.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS)
+    }
+
+    fn is_unhealthy(&self, part: MavSysStatusSensor) -> bool {
         self.last::<SYS_STATUS_DATA>().is_some_and(|Sample { value, .. }| {
-            value.onboard_control_sensors_present.contains(LOG)
-                && !value.onboard_control_sensors_health.contains(LOG)
+            value.onboard_control_sensors_present.contains(part)
+                && !value.onboard_control_sensors_health.contains(part)
         })
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use mavlink::{MavlinkVersion, Message as _, MessageData};
 use protocol::dialect::{
-    MavMessage, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA,
+    MavMessage, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdChute,
     TdInterlock, TdLanding, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
@@ -310,10 +310,16 @@ impl Vehicle {
     /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle
     /// knows its ignition band, it follows from a sink rate of nearly zero and is far off: that
     /// counts as not known.
+    ///
+    /// Under a parachute that does not carry the vehicle yet, a report from before its command is
+    /// one of the fall without it.
     pub fn of_touchdown(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
         use TdPhase as P;
-        let begins = matches!(self.phase_now(), Some(P::TD_PHASE_DEPLOY | P::TD_PHASE_AERO_DESCENT));
-        self.of_descent(pick).filter(|_| !begins || self.of_descent(|d| d.band_low_m).is_some())
+        let phase = self.phase_now();
+        let begins = matches!(phase, Some(P::TD_PHASE_DEPLOY | P::TD_PHASE_AERO_DESCENT));
+        let opens = phase == Some(P::TD_PHASE_CHUTE) && self.descent()?.value.chute != TdChute::TD_CHUTE_OPEN;
+        let settled = !begins || self.of_descent(|d| d.band_low_m).is_some();
+        self.of_descent(pick).filter(|_| settled && !opens)
     }
 
     /// A number of the position and velocity.

@@ -18,23 +18,21 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
-/// A phase in the words of the crew, as in `Ready to light`, and the event that begins it, as the
-/// timeline names it; `None` if the crew need not see it there.
-pub fn doing_and_event(phase: TdPhase) -> (&'static str, Option<&'static str>) {
-    match phase {
-        TdPhase::TD_PHASE_SAFE => ("Safe", None),
-        TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => ("On the pad", None),
-        TdPhase::TD_PHASE_BOOST => ("Rising", Some("lift-off")),
-        TdPhase::TD_PHASE_COAST => ("Coasting", Some("burn-out")),
-        TdPhase::TD_PHASE_DEPLOY => ("Fins opening", Some("apogee")),
-        TdPhase::TD_PHASE_AERO_DESCENT => ("Falling", Some("falls")),
-        TdPhase::TD_PHASE_LAND_ARMED => ("Ready to light", Some("ready")),
-        TdPhase::TD_PHASE_IGNITION => ("Lighting", Some("ignition")),
-        TdPhase::TD_PHASE_POWERED => ("Landing", Some("burns")),
-        TdPhase::TD_PHASE_TOUCHDOWN => ("On the ground", Some("touchdown")),
-        TdPhase::TD_PHASE_SAFED => ("Flight over", Some("over")),
-        TdPhase::TD_PHASE_CHUTE => ("Parachute", Some("parachute")),
-    }
+/// The event that begins a phase, as the timeline names it; `None` if the crew need not see it.
+pub fn event_of(phase: TdPhase) -> Option<&'static str> {
+    Some(match phase {
+        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
+        TdPhase::TD_PHASE_BOOST => "lift-off",
+        TdPhase::TD_PHASE_COAST => "burnout",
+        TdPhase::TD_PHASE_DEPLOY => "apogee",
+        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
+        TdPhase::TD_PHASE_LAND_ARMED => "ready",
+        TdPhase::TD_PHASE_IGNITION => "ignition",
+        TdPhase::TD_PHASE_POWERED => "thrust",
+        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
+        TdPhase::TD_PHASE_SAFED => "over",
+        TdPhase::TD_PHASE_CHUTE => "parachute",
+    })
 }
 
 /// What an event says to the crew; `None` if it tells them nothing that other events or the state
@@ -42,9 +40,8 @@ pub fn doing_and_event(phase: TdPhase) -> (&'static str, Option<&'static str>) {
 pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
     if let Some(phases) = text.strip_prefix("phase ") {
         // The vehicle itself says what lights, and on the pad the crew does it.
-        let phase = phase_from_name(phases.rsplit(' ').next()?)?;
-        return (phase != TdPhase::TD_PHASE_BOOST && !is_on_pad(phase))
-            .then(|| doing_and_event(phase).0.into());
+        let to = phase_from_name(phases.rsplit(' ').next()?)?;
+        return (to != TdPhase::TD_PHASE_BOOST && !is_on_pad(to)).then(|| phase(to).into());
     }
     match text.strip_prefix("controller level ") {
         Some("CONVERGED") => None,
@@ -56,6 +53,7 @@ pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
 /// What steers the burn, by the name of its level, as in `SHIFTED_PLAN`.
 pub fn steered(level: &str) -> String {
     match level {
+        "IDLE" => "not begun".to_owned(),
         "CONVERGED" => "on its plan".to_owned(),
         "BEST_FEASIBLE" => "near its plan".to_owned(),
         "SHIFTED_PLAN" => "on its last plan".to_owned(),
@@ -187,8 +185,8 @@ mod tests {
     #[test]
     fn an_event_has_the_words_of_the_crew_or_none() {
         for (text, words) in [
-            ("phase DEPLOY -> AERO_DESCENT", Some("Falling")),
-            ("phase SAFED", Some("Flight over")),
+            ("phase DEPLOY -> AERO_DESCENT", Some("AERO_DESCENT")),
+            ("phase SAFED", Some("SAFED")),
             ("phase PAD_IDLE -> PAD_ARMED", None),
             ("phase PAD_ARMED -> BOOST", None),
             ("controller level CONVERGED", None),

@@ -2,15 +2,18 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TD_CONTROLLER_DATA, TdCheck, TdControlLevel, TdInterlock, TdPhase};
+use protocol::dialect::{
+    ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, TD_CONTROLLER_DATA, TdCheck, TdControlLevel, TdInterlock,
+    TdPhase,
+};
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 
 use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
-    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Speaker, dead_reckoning::may_have_left, hold_words,
-    is_on_pad, latch_words, refused_frames, why_no_go, words,
+    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, Speaker, dead_reckoning::may_have_left,
+    hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -50,13 +53,13 @@ const fn of_boot(kind: AlarmKind, urgency: u8, holds: fn(&Model, Duration) -> Op
 }
 
 /// The alarms of the station, its link and its log. A silent station says nothing about the link.
-const OF_STATION: [AlarmRow; 13] = [
+const OF_STATION: [AlarmRow; 15] = [
     of_run(AlarmKind::NothingSent, ABORT, |model, now| {
         model.nothing_sent_at.filter(|at| now.saturating_sub(*at) < NOTHING_SENT_SHOWN)?;
         Some(format!("NOTHING WAS SENT: {}", model.settings.role.why_not_command()?))
     }),
     of_run(AlarmKind::StationSilent, WHO, |model, now| {
-        let gone = "STATION GONE: this screen shows the past and commands nothing";
+        let gone = "STATION GONE: this screen shows the past and commands nothing (q leaves)";
         let silent = "STATION SILENT: it does not answer this screen, which shows the past";
         let silence = model.link.station_silence(now).map(|_| silent.to_owned());
         if model.link.station_gone { Some(gone.to_owned()) } else { silence }
@@ -83,6 +86,13 @@ const OF_STATION: [AlarmRow; 13] = [
         let what = "nothing is armed or started; give it another (--sysid)";
         let shares = model.link.shares_our_id(now);
         shares.then(|| format!("another station uses our id {system_id}/{component_id}: {what}"))
+    }),
+    of_boot(AlarmKind::OtherStation(CommandKind::Arm), WHO, |model, _| {
+        other_station(model).map(|which| format!("ARMED BY ANOTHER STATION: {which}"))
+    }),
+    of_boot(AlarmKind::OtherStation(CommandKind::Start), WHO, |model, _| {
+        let which = other_station(model).filter(|_| model.vehicle.counts_down())?;
+        Some(format!("COUNTDOWN BY ANOTHER STATION: {which}; hold or abort"))
     }),
     of_run(AlarmKind::LinkLost, VEHICLE, |model, now| {
         let is_lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
@@ -112,7 +122,7 @@ const OF_STATION: [AlarmRow; 13] = [
 ];
 
 /// The alarms of the vehicle.
-const OF_VEHICLE: [AlarmRow; 13] = [
+const OF_VEHICLE: [AlarmRow; 14] = [
     of_run(AlarmKind::Rebooted, VEHICLE, |model, now| {
         let shown = |at: Duration| now.saturating_sub(at) < REBOOT_SHOWN || model.vehicle.reset_in_flight;
         let (did, _) = model.rebooted.filter(|(_, at)| shown(*at))?;
@@ -128,6 +138,7 @@ const OF_VEHICLE: [AlarmRow; 13] = [
     }),
     of_boot(AlarmKind::Battery, OTHER, |model, _| battery(model)),
     of_boot(AlarmKind::VehicleLog, OTHER, |model, _| vehicle_log(model)),
+    of_boot(AlarmKind::Position, OTHER, |model, _| position(model)),
     // The arming checks do not see everything that a check on the pad sees.
     of_boot(AlarmKind::CheckFailed, OTHER, |model, _| {
         let on_pad = [TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED].map(Some);
@@ -179,6 +190,14 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
         }
         model.outbox.push(Action::Alarm(alarm.what.text));
     }
+}
+
+/// The station that armed the vehicle, if it may not be of this crew. Operators are identified by
+/// their keys.
+fn other_station(model: &Model) -> Option<String> {
+    let Address { system_id, component_id } = model.link.uplink.unproven(model.link.signing.is_some())?;
+    let is_unnamed = model.vehicle.is_armed() && model.people().is_none();
+    is_unnamed.then(|| sender_words(model, &format!("{system_id}/{component_id}")))
 }
 
 /// Whether the vehicle is heard and is known not to hear this station.
@@ -246,8 +265,24 @@ fn battery(model: &Model) -> Option<String> {
     let battery = model.vehicle.battery()?.value;
     let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
-    let left = battery.percent.map_or_else(String::new, |percent| format!(", {percent} % left"));
+    // A charge above that limit is an estimate that the voltage contradicts.
+    let left = battery.percent.filter(|_| empty);
+    let left = left.map_or_else(String::new, |percent| format!(", {percent} % left"));
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
+}
+
+/// A position without satellites drifts. On the pad it is a failing check.
+fn position(model: &Model) -> Option<String> {
+    model.vehicle.left_pad_at?;
+    let is_unknown = |Sample { value, .. }: Sample<ESTIMATOR_STATUS_DATA>| {
+        !value.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS)
+    };
+    let lost = if model.vehicle.gnss_is_lost() {
+        "GNSS"
+    } else {
+        model.vehicle.last().is_some_and(is_unknown).then_some("POSITION")?
+    };
+    Some(format!("{lost} LOST: the position may be off by {:.0} m", model.heard_error_m()))
 }
 
 /// Before the self-test is over a log may still be about to begin.

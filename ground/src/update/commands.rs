@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use protocol::command::{CommandAnswer, CommandEvent, Resend, Ticket, result_words};
+use protocol::command::{CommandAnswer, CommandEvent, Resend, StationHold, Ticket, result_words};
 use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdAct, TdHold, TdPhase};
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
@@ -78,7 +78,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
     match why_not {
         // The next one comes within 1 s, and the vehicle shows the time that is left.
         None if kind == CommandKind::Tap => {
-            send_once(model, kind);
+            send_once(model, kind, 0.0);
             model.record_operator(now, "commanded", by, &format!("TAP{}", by.in_brackets()));
         }
         None => submit(model, kind, by.clone(), now),
@@ -322,6 +322,12 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
             told.push((EventLevel::Error, track.by.clone(), text));
             continue;
         }
+        // Then the effect is that of another station's command.
+        let denied = Acknowledgement::Answered(MavResult::MAV_RESULT_DENIED as u8);
+        if track.kind.moves() && track.acknowledged == denied {
+            track.observed_at = None;
+            continue;
+        }
         let answered = seen.is_none() && track.accepted();
         let shown = answered || track.kind.is_observed(&model.vehicle, track.commanded_at);
         let (level, text) = if let Some(since) = track.observed_at {
@@ -462,14 +468,12 @@ const HOLD_EVERY: Duration = Duration::from_millis(100);
 const HALF_A_TICK: Duration = Duration::from_millis(50);
 
 /// Why this station is not fit to command a countdown.
-fn why_unfit(model: &Model, now: Duration) -> Option<&'static str> {
+fn why_unfit(model: &Model, now: Duration) -> Option<StationHold> {
     match model.unfit_log(now) {
-        _ if !model.settings.auto && model.crew.is_gone(now) => Some("no commanding screen in the countdown"),
-        _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
-            Some("TWO VEHICLES in the countdown")
-        }
+        _ if !model.settings.auto && model.crew.is_gone(now) => Some(StationHold::NoScreen),
+        _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => Some(StationHold::TwoVehicles),
         None | Some((LogFault::Full, _)) => None,
-        Some(_) => Some("the station's log fails in the countdown"),
+        Some(_) => Some(StationHold::LogFails),
     }
 }
 
@@ -486,14 +490,14 @@ pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
     if model.crew.hold_due.is_none() || (too_late && !model.crew.too_late_told) {
         model.crew.too_late_told = too_late;
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
-        let text = format!("{why}: {what}");
+        let text = format!("{} in the countdown: {what}", why.words());
         model.tell_act(now, "hold", &Seat::default(), EventLevel::Warning, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if too_late {
         model.crew.hold_due = Some(due);
     } else if now + HALF_A_TICK >= due {
-        send_once(model, CommandKind::Hold);
+        send_once(model, CommandKind::Hold, why.parameter());
         model.crew.hold_due = Some(now + HOLD_EVERY);
     }
 }
@@ -504,11 +508,12 @@ fn counts_down(model: &Model) -> bool {
 }
 
 /// Sends a command once, without following it.
-pub(super) fn send_once(model: &mut Model, kind: CommandKind) {
+pub(super) fn send_once(model: &mut Model, kind: CommandKind, param2: f32) {
     let (command, param1) = kind.mav_command();
     model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         command,
         param1,
+        param2,
         target_system: model.settings.vehicle.system_id,
         target_component: model.settings.vehicle.component_id,
         param7: if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 },

@@ -289,6 +289,7 @@ pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
 /// Enters what the vehicle says of its crew and its mission, if it has changed.
 pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &Announced, now: Duration) {
     let (mission, former) = (&after.mission, &before.mission);
+    let holds = [before, after].map(|state| (state.hold, state.crew.held_by));
     let (after, before) = (&after.crew, &before.crew);
     let mut lines: Vec<(u8, String)> = Vec::new();
     if after.people != before.people {
@@ -302,7 +303,6 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &
     let roles = [
         (after.commanded_by, before.commanded_by, "is in command"),
         (after.tapped_by, before.tapped_by, "confirmed the start and taps"),
-        (after.held_by, before.held_by, "held the countdown"),
     ];
     for (after, before, words) in roles {
         if after != before && after > 0 {
@@ -311,6 +311,21 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &
     }
     if let Some(mission) = mission.as_ref().filter(|_| mission != former) {
         lines.push((0, format!("it flies the mission {} {}", mission.in_words(), mission.hash)));
+    }
+    if holds[0] != holds[1]
+        && let (Some(hold), by @ 1..) = holds[1]
+    {
+        // A silence is no act of a person.
+        let whose = format!("of {} (key {by})", model.operator(by));
+        match hold {
+            TdHold::TD_HOLD_COMMANDED => lines.push((by, "requested the hold".to_owned())),
+            TdHold::TD_HOLD_TAP_OVERDUE => lines.push((0, format!("HOLD: no tap {whose}"))),
+            TdHold::TD_HOLD_UPLINK_SILENT => lines.push((0, format!("HOLD: station {whose} not received"))),
+            TdHold::TD_HOLD_STATION_DEAF => {
+                lines.push((0, format!("HOLD: station {whose} receives nothing")))
+            }
+            TdHold::TD_HOLD_NONE | TdHold::TD_HOLD_CHECK_FAILED => {}
+        }
     }
     for (by, words) in lines {
         let boot = model.boot_beside_others(now);

@@ -87,22 +87,26 @@ impl Item {
     }
 }
 
-/// The alphabet: each letter as often as it is wide, and under it its five rows of pixels. A zero
+/// The alphabet: each letter as often as it is wide, and under it its rows of pixels. A zero
 /// is open, so that it is no eight.
 const ALPHABET: &str = include_str!("letters.txt");
 /// Pixels of a digit with the gap behind it.
 const DIGIT_PIXELS: u16 = 5;
 
+/// Rows of pixels of the alphabet. The last one is below the feet of the letters: a point reaches
+/// into it, so that it is not read as a part of the digit beside it.
+const PIXEL_ROWS: usize = 6;
+
 /// The columns of pixels of a text, each with a gap between two letters behind its last one.
-fn columns(text: &str) -> impl Iterator<Item = [bool; 5]> {
+fn columns(text: &str) -> impl Iterator<Item = [bool; PIXEL_ROWS]> {
     let mut lines = ALPHABET.lines().map(str::as_bytes);
     let names = lines.next().unwrap_or_default();
-    let rows: [&[u8]; 5] = std::array::from_fn(|_| lines.next().unwrap_or_default());
+    let rows: [&[u8]; PIXEL_ROWS] = std::array::from_fn(|_| lines.next().unwrap_or_default());
     let column = move |place: usize| rows.map(|row| row.get(place) == Some(&b'#'));
     let blank = |letter: u8| if letter == b' ' { b'_' } else { letter };
     text.bytes().map(blank).flat_map(move |letter| {
         let of_it = (0..names.len()).filter(move |place| names[*place] == letter);
-        of_it.map(column).chain([[false; 5]])
+        of_it.map(column).chain([[false; PIXEL_ROWS]])
     })
 }
 
@@ -192,6 +196,11 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
         let middle = Rect { y: at.y + 1, height: 1, ..at }.intersection(at);
         return draw_line(frame, middle, Line::styled(spaced, style));
     }
+    if item.role == TextRole::Alarm {
+        // Its ground is whole, or the letters look torn.
+        let ground = Rect { width: (item.pixels * width).min(at.width), ..at };
+        frame.buffer_mut().set_style(ground, style);
+    }
     for (place, column) in columns(&item.text).enumerate() {
         let pixel = |half: u16| column.get(usize::from(half / halves)) == Some(&true);
         for row in 0..at.height {
@@ -209,7 +218,49 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
 
 #[cfg(test)]
 mod tests {
+    use ratatui::Terminal;
+    use ratatui::backend::TestBackend;
+    use ratatui::buffer::Buffer;
+
     use super::*;
+    use crate::view::theme::Palette;
+
+    /// The drawn letters of a text: of each its columns of half cells. Letters are apart by an
+    /// empty column; what is no larger than one half cell is taken for noise, as from afar.
+    fn glyphs(text: &str, size: Size) -> Vec<Vec<Vec<bool>>> {
+        let mut terminal = Terminal::new(TestBackend::new(80, 8)).expect("a terminal of memory");
+        let theme = Theme { palette: Palette::Dark, ascii: false };
+        let item = word("", text, TextRole::Title);
+        let area = Rect { x: 0, y: 0, width: 80, height: rows_of(size) };
+        let buffer = terminal.draw(|frame| big(&item, size, theme, frame, area)).expect("drawn").buffer;
+        let halves = |buffer: &Buffer, x: u16| {
+            let symbols = (0..area.height).map(|y| buffer[(x, y)].symbol());
+            symbols.flat_map(|symbol| ["█▀", "█▄"].map(|inked| inked.contains(symbol))).collect::<Vec<_>>()
+        };
+        let columns: Vec<Vec<bool>> = (0..area.width).map(|x| halves(buffer, x)).collect();
+        let is_ink = |column: &Vec<bool>| column.contains(&true);
+        let runs = columns.chunk_by(|one, next| is_ink(one) == is_ink(next)).filter(|run| is_ink(&run[0]));
+        let inked = |run: &[Vec<bool>]| run.iter().flatten().filter(|half| **half).count();
+        runs.filter(|run| inked(run) > 1).map(<[_]>::to_vec).collect()
+    }
+
+    /// A point that is a single half cell would be lost, and 2.1 read as 21.
+    #[test]
+    fn every_number_is_read_back_from_its_large_digits() {
+        for size in [NARROW, (1, 2), (2, 1), (2, 2), (3, 3)] {
+            let templates = "0123456789.".chars().map(|letter| (letter, glyphs(&letter.to_string(), size)));
+            let templates: Vec<_> = templates.collect();
+            for tenths in 0..=999_u32 {
+                let text = fixed(f64::from(tenths) / 10.0, 1);
+                let letter = |glyph: &Vec<Vec<bool>>| {
+                    let mut found = templates.iter().filter(|(_, drawn)| drawn.as_slice() == [glyph.clone()]);
+                    found.next().map_or('?', |(letter, _)| *letter)
+                };
+                let read: String = glyphs(&text, size).iter().map(letter).collect();
+                assert_eq!(read, text, "{size:?}");
+            }
+        }
+    }
 
     /// From afar a zero must not look like an eight, and every letter of the large words is in the
     /// alphabet.

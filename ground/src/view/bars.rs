@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TdLanding;
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Style;
@@ -9,8 +10,8 @@ use ratatui::text::{Line, Span};
 
 use super::panels::{decimals, limit_rows};
 use super::theme::Ink;
-use super::{TextRole, Theme, age_mark, draw_line, fixed, pages};
-use crate::model::{Deflection, Model};
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, pages, shortest};
+use crate::model::{Deflection, Gimbal, Model, Sample, Verdict, words};
 
 /// Where the limit stands on a bar, so that an excess can be seen.
 const LIMIT_AT: f64 = 0.8;
@@ -21,7 +22,7 @@ const LIMIT_COLUMNS: u16 = 11;
 /// The most columns of a bar: a longer one says no more.
 const BAR_COLUMNS: u16 = 30;
 /// The widest panel that has no room for them.
-const NARROW: u16 = 44;
+const NARROW: u16 = 40;
 
 /// Two marks with their words, at the right end of a title.
 pub fn legend(measured: [&'static str; 2], predicted: [&'static str; 2], theme: Theme) -> Line<'static> {
@@ -61,7 +62,10 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let inside = pages::framed(title, Line::default(), theme, frame, area);
         return draw_line(frame, inside, theme.line(" no prediction", TextRole::Label));
     };
+    let in_table_2 = |verdict: Sample<Verdict>| verdict.value.landing.contains(TdLanding::TD_LANDING_TABLE_2);
+    let outside_table_2 = vehicle.verdict().is_some_and(|verdict| !in_table_2(verdict));
     let words = match at.value.violations() {
+        None if outside_table_2 => theme.line(" T2: the paper's Table 2 ", TextRole::Caution),
         None => theme.line(" inside the envelope ", TextRole::Good),
         Some(names) => theme.line(format!(" OUTSIDE {names} "), TextRole::Alarm),
     };
@@ -75,7 +79,15 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let rows = limit_rows(&at.value, vehicle.limits().as_ref());
     for (row, y) in rows.into_iter().zip(inside.top()..inside.bottom()) {
         let at = Rect { y, height: 1, ..inside };
-        let (word, word_role) = if row.kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+        let table_2 = outside_table_2 && row.value.abs() > row.table_2;
+        let (word, word_role) = match () {
+            () if !row.kept => ("NO", TextRole::Alarm),
+            () if table_2 => ("T2", TextRole::Caution),
+            () if row.limit.is_empty() => ("  ", TextRole::Plain),
+            () => ("ok", TextRole::Good),
+        };
+        let limit =
+            if table_2 { format!("T2 {} {}", shortest(row.table_2), row.unit) } else { row.limit.clone() };
         let value = format!("{mark}{:>5}", fixed(row.value, decimals(row.value)));
         let name = theme.label(format!(" {:<8}", row.name));
         let words = [theme.span(word, word_role), name, theme.span(value, strong(role))];
@@ -83,7 +95,7 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let room = at.width.saturating_sub(BEFORE_BAR + limit_columns);
         let mark = row.used.is_finite().then_some((LIMIT_AT, limit_ink));
         bar([0.0, LIMIT_AT * row.used], ink, mark, frame, Rect { x: at.x + BEFORE_BAR, width: room, ..at });
-        let words = theme.either_side(&format!(" {}", row.limit));
+        let words = theme.either_side(&format!(" {limit}"));
         let beside = Rect { x: at.right() - limit_columns, width: limit_columns, ..at };
         draw_line(frame, beside, Line::styled(words, limit_ink));
     }
@@ -94,9 +106,51 @@ fn strong(role: TextRole) -> TextRole {
     if role == TextRole::Plain { TextRole::Title } else { role }
 }
 
+/// Phase, and fins and gimbal as numbers: measured, and commanded behind the stroke, degrees. It has
+/// the same columns in every phase.
+pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
+    let vehicle = &model.vehicle;
+    let mark = |stale: bool| if stale { STALE_MARK } else { " " };
+    let pair = |angle: Option<Deflection>, text: fn(f64) -> String| {
+        let text = |pick: fn(&Deflection) -> f64| {
+            angle.map_or_else(|| "--".to_owned(), |at| text(pick(&at).to_degrees()))
+        };
+        format!("{}/{}", text(|at| at.measured_rad), text(|at| at.commanded_rad))
+    };
+    let whole = |deg: f64| format!("{:>2}", fixed(deg, 0));
+    // Of a large deflection the tenth says nothing.
+    let signed = |deg: f64| {
+        format!(
+            "{:>4}",
+            format!("{}{}", if deg < 0.0 { "" } else { "+" }, fixed(deg, usize::from(deg.abs() < 9.95)))
+        )
+    };
+    let (fins, gimbal) = (vehicle.fins(), vehicle.gimbal());
+    let each: Vec<String> =
+        (0..4).map(|k| format!("{:>5}", pair(fins.map(|fins| fins.value[k]), whole))).collect();
+    let phase = vehicle.phase_now().map_or_else(|| "no phase".to_owned(), words::phase);
+    let of = |plane: fn(&Gimbal) -> Deflection| {
+        format!("{:>9}", pair(gimbal.map(|gimbal| plane(&gimbal.value)), signed))
+    };
+    let fins_stale = fins.is_some_and(|fins| fins.is_stale(now));
+    let gimbal_stale = gimbal.is_some_and(|gimbal| gimbal.is_stale(now));
+    Line::from(vec![
+        theme.span(format!(" {phase:<12}"), TextRole::Title),
+        theme.label(" fins deg/cmd"),
+        theme.plain(format!("{}{}", mark(fins_stale), each.join(" "))),
+        theme.label(" gimbal"),
+        theme.plain(format!(
+            "{}P{} Y{}",
+            mark(gimbal_stale),
+            of(|gimbal| gimbal.pitch),
+            of(|gimbal| gimbal.yaw)
+        )),
+    ])
+}
+
 /// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
 pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let legend = legend([" ▄", " is "], ["│", " asked "], theme);
+    let legend = legend([" ▄", " is "], ["│", " cmd "], theme);
     let area = pages::framed("fins, gimbal", legend, theme, frame, area);
     let (fins, gimbal) = (model.vehicle.fins(), model.vehicle.gimbal());
     let limit_deg = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());

@@ -14,7 +14,8 @@ use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Event, Model, Page, dead_reckoning::course, is_burning, is_flight, is_on_pad, words,
+    Act, Danger, Event, KeepAway, Model, Page, dead_reckoning::foreseen, dead_reckoning::is_unheard,
+    is_burning, is_flight, is_on_pad, words,
 };
 use crate::view::pictures::seconds_since;
 
@@ -84,16 +85,21 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     let apogee = vehicle.of_descent(|d| d.time_to_apogee_s).filter(|left| left.value > 0.0);
     let ignition = vehicle.ignition_in_s(now).filter(|_| !is_burning(phase));
     let touchdown = vehicle.touchdown_in_s(now).filter(|_| is_burning(phase)).map(|left| left.value);
-    let ground =
-        || course(vehicle, now).last().filter(|(_, [.., up_m])| *up_m < 1.0).map(|(ahead_s, _)| *ahead_s);
+    let ground = || {
+        let ends = foreseen(vehicle, now).last().copied().filter(|(_, [.., up_m])| *up_m < 1.0)?;
+        Some(seconds_since(ends.0, now))
+    };
     let left = [
         ("apogee", apogee.map(|left| left.value - left.age(now).as_secs_f64())),
         ("ignition", ignition.map(|left| left.value)),
         ("touchdown", touchdown.or_else(ground)),
     ];
-    let known =
-        left.into_iter().filter_map(|(name, left_s)| Some((name, left_s.filter(|left_s| *left_s >= 0.0)?)));
-    known.map(|(name, left_s)| (name, now + Duration::from_secs_f64(left_s))).collect()
+    // After a loss of the link, the expected touchdown may have passed.
+    let known = left.into_iter().filter_map(|(name, left_s)| {
+        let left_s = left_s.filter(|left_s| *left_s >= 0.0 || is_unheard(vehicle, now))?;
+        Some((name, Duration::try_from_secs_f64(now.as_secs_f64() + left_s).ok()?))
+    });
+    known.collect()
 }
 
 /// The flight along its time in a row, and from some width on the names in a second one.
@@ -103,7 +109,12 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let to_come = expected(model, now);
     let (phases, from, length_s): (&[(TdPhase, Duration)], Duration, f64) =
         if let Some(playing) = &model.playing {
-            (&playing.phases, Duration::ZERO, playing.length.as_secs_f64().max(1.0))
+            // The flight fills the line, not the time on the pad and the waiting after it.
+            let mut flown = playing.phases.iter().skip_while(|(phase, _)| is_on_pad(*phase));
+            let from = flown.next().map_or(Duration::ZERO, |(_, at)| at.saturating_sub(STILL_AFTER));
+            let down = flown.find(|(phase, _)| !is_flight(*phase));
+            let until = down.map_or(playing.length, |(_, at)| playing.length.min(*at + STILL_AFTER));
+            (&playing.phases, from, until.saturating_sub(from).as_secs_f64().max(1.0))
         } else {
             let from = flight_began(model).unwrap_or(now);
             let last = to_come.iter().map(|(_, at)| *at).max().unwrap_or(now).max(now);
@@ -133,21 +144,20 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
         let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
-        let name = if is_told {
-            "commanded to light"
-        } else {
-            words::doing_and_event(*phase).1.filter(|_| !again)?
-        };
+        let name = if is_told { "ignition commanded" } else { words::event_of(*phase).filter(|_| !again)? };
         Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.
     let step_s = length_s * EXPECTED_STEP;
     let steady = |at: Duration| {
         let steps = libm::round(at.saturating_sub(from).as_secs_f64() / step_s);
-        (from + Duration::from_secs_f64(steps * step_s)).max(now)
+        let at = from + Duration::from_secs_f64(steps * step_s);
+        if is_unheard(&model.vehicle, now) { at } else { at.max(now) }
     };
     let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), *at, EXPECTED, Ink::Predicted));
-    let marks: Vec<_> = been.chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
+    let reset = model.rebooted.filter(|_| model.vehicle.reset_in_flight);
+    let reset = reset.map(|(_, at)| ("RESET", at, at, EVENT, Ink::Body));
+    let marks: Vec<_> = been.chain(reset).chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
     let lift_off = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map_or(from, |(_, at)| *at);
     for (_, at, _, mark, ink) in &marks {
         rows[0][column(*at)] = (*mark, *ink);
@@ -226,7 +236,14 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.
     let holds = model.vehicle.in_flight() && model.pages.held.is_none();
-    let matters = |act: &Act| (*act != Act::Acknowledge || rings) && (*act != Act::Hold || holds);
+    let away = KeepAway::of(&model.vehicle, now).is_some_and(|away| away.danger != Danger::LiveWaited);
+    let matters = |act: &Act| match act {
+        Act::Acknowledge => rings,
+        Act::Hold => holds,
+        Act::HoldCountdown => !model.is_past_hold(now),
+        Act::Arm | Act::Start | Act::Check => !away,
+        _ => true,
+    };
     let works = |act: &Act| matters(act) && act.works(model, now);
     let mut room = usize::from(left.width);
     let spans = KEYS

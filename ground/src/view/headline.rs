@@ -9,11 +9,11 @@ use super::pictures::map::comes_down;
 use super::top_lines::readiness;
 use super::{STALE_MARK, TextRole};
 use crate::model::{
-    AlarmKind, Approach, Ending, Model, Sample, Spot,
+    AlarmKind, Approach, Ending, Model, Sample, Spot, Vehicle,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
-use protocol::dialect::TdPhase;
+use protocol::dialect::{TdInterlock, TdPhase};
 
 // The largest words of every page, when people may be in danger or have waited for the word: DO NOT
 // APPROACH, ONE PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they
@@ -21,6 +21,8 @@ use protocol::dialect::TdPhase;
 
 /// What is said of a vehicle that has left the pad, and nobody commanded it.
 const LIFT_OFF: &str = "LIFT-OFF";
+/// A landing motor that was commanded and gave no thrust.
+const NO_LIGHT: &str = "NO LIGHT";
 /// What is said of an abort that its station has not sent.
 const NOT_SENT: &str = "ABORT NOT SENT";
 /// What is said of a vehicle that may have left the pad unheard.
@@ -61,12 +63,23 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         }
         None if may_have_left(vehicle, now).is_some() => may_fly(model),
         _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, commanded_by_nobody()),
+        None if has_not_lit(vehicle) => {
+            let chute = vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
+            let then = if chute { "parachute commanded" } else { "no parachute commanded" };
+            Banner::alarm(NO_LIGHT, format!(": the landing motor gave no thrust; {then}"))
+        }
         Some(Ending::Lost) => {
             let rest = format!("{}: do not approach", Ending::Lost.detail(vehicle));
             Banner::alarm(Ending::Lost.word(), rest)
         }
         _ => return None,
     })
+}
+
+/// Whether it is in flight with a landing motor that was commanded and gave no thrust.
+fn has_not_lit(vehicle: &Vehicle) -> bool {
+    let no_light = |locks: TdInterlock| locks.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT);
+    vehicle.in_flight() && vehicle.interlocks().is_some_and(no_light)
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line
@@ -174,7 +187,7 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let lands_off = || {
         let mut lands = number("lands off m", off_pad, 0, 3, now).predicted();
         if off_pad.zip(fence_m).is_some_and(|(off_pad, fence_m)| off_pad.value > fence_m) {
-            (lands.label, lands.role) = ("BEYOND FENCE".to_owned(), TextRole::Caution);
+            (lands.label, lands.role) = ("OFF, PAST FENCE".to_owned(), TextRole::Caution);
         }
         lands
     };
@@ -203,6 +216,12 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
 /// The verdict.
 pub fn verdict(model: &Model, now: Duration) -> Item {
     let ended = ending_role(model, now).map(|(ending, role)| (ending.words()[1], role));
-    let (text, role) = ended.unwrap_or(("NO VERDICT", TextRole::Caution));
+    let settles = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_TOUCHDOWN);
+    let none = match settles {
+        true => ("DOWN, SETTLING", TextRole::Title),
+        false if model.vehicle.in_flight() => ("IN FLIGHT", TextRole::Title),
+        false => ("NO VERDICT", TextRole::Caution),
+    };
+    let (text, role) = ended.unwrap_or(none);
     word("", text, role)
 }

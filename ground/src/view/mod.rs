@@ -29,7 +29,7 @@ use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap};
 
-use crate::model::Model;
+use crate::model::{Model, Page};
 pub use theme::{Ink, TextRole, Theme};
 use top_lines::ABORT_LABEL;
 use widgets::{STALE_MARK, age_mark, fixed, quantity_row, seconds, shortest, text_row};
@@ -95,13 +95,16 @@ fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
     let banner = headline::banner(model, now);
     let messages = footer::message_rows(model, theme, now, area.width);
     let state_rows = if area.width < top_lines::ONE_ROW_COLUMNS { 2 } else { 1 };
-    let [identity, state, words, body, message, keys] = stacked(
+    let has_surfaces =
+        !matches!(model.page(), Page::Help | Page::Find) && model.vehicle.as_foreign().is_none();
+    let [identity, state, words, body, surfaces, message, keys] = stacked(
         area,
         [
             Length(1),
             Length(state_rows),
             Length(banner.is_some().into()),
             Fill(1),
+            Length(has_surfaces.into()),
             Length(messages.len() as u16),
             Length(1),
         ],
@@ -122,6 +125,7 @@ fn draw_wide(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area
         body = Rect { y: body.y + rows, height: body.height - rows, ..body };
     }
     let pictures = pages::draw(model, theme, now, frame, body);
+    draw_line(frame, surfaces, bars::surfaces_line(model, theme, now));
     draw_lines(frame, message, &messages);
     footer::draw_keys(model, theme, now, frame, keys);
     dialog::draw_palette(model, theme, now, frame, body);

@@ -53,18 +53,24 @@ pub struct LimitRow {
     pub limit: String,
     /// How much of the limit is used: 0 for a perfect landing, 1 at the limit; NaN without one.
     pub used: f64,
-    /// Whether the vehicle says that the limit is kept.
+    /// Whether the vehicle reports the limit as met.
     pub kept: bool,
+    /// The limit of the landing paper's Table 2, in the same unit.
+    pub table_2: f64,
 }
 
-/// A touchdown and the design envelope of the legs. Limits and judgement are the vehicle's own.
+/// Limits of the landing paper's Table 2, m, m, m/s, m/s, deg, deg/s.
+const TABLE_2: [f64; 6] = [20.0, 0.2, 0.4, 0.1, 5.0, 2.0];
+
+/// A touchdown, the fence, and the design envelope of the legs. Limits and judgement are the
+/// vehicle's.
 pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
     let told = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
         limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
     };
     let degrees = f64::to_degrees;
     let rows = [
-        (at.distance_m, f64::NAN, "m"),
+        (at.distance_m, told(|l| l.fence_m), "m"),
         (at.height_m, f64::NAN, "m"),
         (-at.vertical_m_s, told(|l| l.vertical_m_s), "m/s"),
         (at.lateral_m_s, told(|l| l.lateral_m_s), "m/s"),
@@ -74,11 +80,14 @@ pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> 
     std::array::from_fn(|place| {
         let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
         let limit = match bit {
-            TdLimit::TD_LIMIT_DISTANCE | TdLimit::TD_LIMIT_HEIGHT => String::new(),
+            TdLimit::TD_LIMIT_HEIGHT => String::new(),
+            TdLimit::TD_LIMIT_DISTANCE if !(most > 0.0) => String::new(),
             _ if limits.is_none() => format!("-- {unit}"),
             _ => format!("±{} {unit}", shortest(most)),
         };
-        LimitRow { name, value, unit, limit, used: value.abs() / most, kept: !at.violated.contains(bit) }
+        let beyond_fence = bit == TdLimit::TD_LIMIT_DISTANCE && most > 0.0 && value > most;
+        let kept = !at.violated.contains(bit) && !beyond_fence;
+        LimitRow { name, value, unit, limit, used: value.abs() / most, kept, table_2: TABLE_2[place] }
     })
 }
 
@@ -152,14 +161,15 @@ mod limit_rows_tests {
     fn limits_are_the_vehicles_own_and_unknown_before_it_reports_them() {
         let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
         assert_eq!(words(None), ["", "", "-- m/s", "-- m/s", "-- deg", "-- deg/s"]);
-        assert_eq!(words(Some(&LIMITS)), ["", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);
+        assert_eq!(words(Some(&LIMITS)), ["±120 m", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);
     }
 
     #[test]
     fn every_limit_is_used_from_a_perfect_landing_to_its_edge() {
         for share in [0.0, 1.0, 2.0] {
             let used = limit_rows(&at(share), Some(&LIMITS)).map(|row| row.used);
-            assert!(used[..2].iter().all(|used| used.is_nan()), "they have no limit");
+            assert!((used[0] - 3.0 / 120.0).abs() < 1e-9, "of the fence");
+            assert!(used[1].is_nan(), "it has no limit");
             assert!(used[2..].iter().all(|used| (used - share).abs() < 1e-6), "{used:?}");
         }
     }

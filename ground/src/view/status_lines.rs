@@ -44,14 +44,14 @@ fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
-        TdPhase::TD_PHASE_BOOST if !vehicle.has_lifted => words("lift-off", ", commanded to light"),
+        TdPhase::TD_PHASE_BOOST if !vehicle.has_lifted => words("lift-off", ", ignition commanded"),
         // The time stands in the row of the abort, on every page.
         TdPhase::TD_PHASE_COAST if is_inhibited(vehicle) => {
             words("parachute", &format!("{}, at apogee", apogee_in(vehicle, now)))
         }
         TdPhase::TD_PHASE_BOOST if is_inhibited(vehicle) => words("parachute", ", at apogee"),
         TdPhase::TD_PHASE_DEPLOY if is_inhibited(vehicle) => words("parachute", ""),
-        TdPhase::TD_PHASE_BOOST => words("burn-out", ", then it coasts to apogee"),
+        TdPhase::TD_PHASE_BOOST => words("burnout", ", then it coasts to apogee"),
         TdPhase::TD_PHASE_COAST => {
             let attached =
                 vehicle.descent().is_some_and(|d| d.value.booster == TdBooster::TD_BOOSTER_ATTACHED);

@@ -15,9 +15,9 @@ use ratatui::text::{Line, Span};
 use super::theme::Level;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
 use crate::model::{
-    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role, Standing,
-    TERMINATION, TrackedCommand, abort_too_late, dead_reckoning::may_have_left, hold_words,
-    is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role,
+    STALE_AFTER, Sample, Standing, TERMINATION, TrackedCommand, abort_too_late,
+    dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -254,12 +254,13 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// What the vehicle does, in words.
-pub fn doing(model: &Model, phase: TdPhase) -> &'static str {
+/// The phase by the name that logs and reports give it; beside it, a countdown, and an ascent motor
+/// that is commanded and has not lifted the vehicle.
+pub fn doing(model: &Model, phase: TdPhase) -> String {
     match phase {
-        _ if is_on_pad(phase) && model.vehicle.counts_down() => "Countdown",
-        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "Told to light",
-        _ => words::doing_and_event(phase).0,
+        _ if is_on_pad(phase) && model.vehicle.counts_down() => "COUNTDOWN".to_owned(),
+        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "IGN COMMANDED".to_owned(),
+        _ => words::phase(phase),
     }
 }
 
@@ -278,6 +279,17 @@ pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
+/// The time to release as it is now, s: it runs on between two reports, for as long as a report is
+/// not stale, and stands still at the release and on the ground.
+fn clock_s(model: &Model, told: Sample<f64>, now: Duration) -> f64 {
+    let left_s = told.value - told.age(now).min(STALE_AFTER).as_secs_f64();
+    match told.value > 0.0 {
+        true => left_s.max(0.0),
+        false if model.vehicle.in_flight() => left_s,
+        false => told.value,
+    }
+}
+
 /// Time to release, or since it.
 pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.countdown_s() {
@@ -290,7 +302,7 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
             let (mark, role) = age_mark(&time, now);
             let sign = if time.value > 0.0 { '-' } else { '+' };
             let role = if role == TextRole::Stale { role } else { TextRole::Title };
-            theme.span(format!("{mark}T{sign}{:.1}", time.value.abs()), role)
+            theme.span(format!("{mark}T{sign}{:.1}", clock_s(model, time, now).abs()), role)
         }
     }
 }
@@ -344,7 +356,8 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
     if let Some(track) = model.commands.of(CommandKind::Abort) {
         return command_facts(track, columns, theme, now);
     }
-    let mut spans = vec![theme.label(ABORT_LABEL), theme.plain(effect)];
+    let label = if model.settings.role == Role::Replaying { " abort then: " } else { ABORT_LABEL };
+    let mut spans = vec![theme.label(label), theme.plain(effect)];
     spans.extend(hold_until(model, now).map(|words| theme.span(words, TextRole::Caution)));
     Line::from(spans)
 }
@@ -372,7 +385,11 @@ fn abort_effect(model: &Model, now: Duration) -> String {
         _ if may_have_left(&model.vehicle, now).is_some() => {
             return "MAY NOT ARRIVE; what it would do is not told".to_owned();
         }
-        _ if let Some(why) = abort_too_late(model, now) => return why.to_owned(),
+        _ if model.settings.role != Role::Replaying
+            && let Some(why) = abort_too_late(model, now) =>
+        {
+            return why.to_owned();
+        }
         Some(status) => status,
     };
     let mark = if status.is_stale(now) { "~" } else { "" };

@@ -8,8 +8,8 @@ use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
 use ground::view::headline::pad;
 use protocol::dialect::{
-    MavCmd, MavMessage, MavSysStatusSensor, SYS_STATUS_DATA, TdAbortEffect, TdCheck, TdControlLevel,
-    TdInterlock, TdPhase,
+    ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, MavCmd, MavMessage, MavSysStatusSensor, SYS_STATUS_DATA,
+    TdAbortEffect, TdCheck, TdControlLevel, TdInterlock, TdPhase,
 };
 use protocol::signing::SigningCounters;
 
@@ -81,6 +81,48 @@ fn a_log_of_the_vehicle_that_stops_in_flight_is_an_alarm_that_stays() {
     assert!(is_told(&rig) && rig.model.vehicle.log_has_stopped());
     let text = rig.model.alarms.foremost().map(|alarm| alarm.what.text.as_str());
     assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded whole"));
+}
+
+/// On the pad it is a failing check.
+#[test]
+fn a_loss_of_gnss_after_lift_off_is_an_alarm_on_every_page() {
+    let gnss = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS;
+    let absolute = EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS;
+    let loss = |rig: &mut Rig, health, flags| {
+        rig.hear(&MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+            onboard_control_sensors_present: gnss,
+            onboard_control_sensors_health: health,
+            ..SYS_STATUS_DATA::default()
+        }));
+        rig.hear(&MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
+            flags,
+            pos_horiz_accuracy: 40.0,
+            ..ESTIMATOR_STATUS_DATA::default()
+        }));
+        rig.run(0.2);
+    };
+    let nothing = MavSysStatusSensor::empty();
+    for (health, flags, words) in [
+        (nothing, absolute, "GNSS LOST: the position may be off by 98 m"),
+        (gnss, EstimatorStatusFlags::empty(), "POSITION LOST: the position may be off by 98 m"),
+    ] {
+        let mut rig = Rig::crewed();
+        loss(&mut rig, health, flags);
+        assert!(!rig.model.alarms.is_unseen(AlarmKind::Position), "before the flight");
+        (rig.phase, rig.armed) = (TdPhase::TD_PHASE_COAST, true);
+        loss(&mut rig, gnss, absolute);
+        rig.run(1.0);
+        assert!(!rig.model.alarms.is_unseen(AlarmKind::Position));
+        loss(&mut rig, health, flags);
+        for page in "123456789?".chars() {
+            rig.key(Key::Char(page));
+            rig.expect_screen(words);
+        }
+        rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
+        rig.run(10.0);
+        let mut alarms = rig.model.alarms.list().iter();
+        assert!(alarms.any(|alarm| alarm.is_active() && alarm.what.text == words));
+    }
 }
 
 /// Boot number and clock go on: the vehicle was not switched off.

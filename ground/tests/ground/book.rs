@@ -67,11 +67,37 @@ fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
     };
     rig.hear(&MavMessage::TD_CREW(ask.clone()));
     rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { ask_left_ms: 8_000, ..ask }));
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, held_by: 2, ..crew }));
+    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, ..crew.clone() }));
     assert_eq!(has(&rig, "vehicle says", "key 2: asks to arm (ask 4711)"), 1);
     let by = entered(&rig).into_iter().find(|line| line.text.contains("is in command")).unwrap();
     assert_eq!(by.who, "FLIGHT Bob");
-    assert_eq!(has(&rig, "vehicle says", "key 2: held the countdown"), 1);
+    // Whichever message is first. Only the one who requested a hold is entered as a person.
+    for (hold, who, words) in [
+        (TdHold::TD_HOLD_COMMANDED, "FLIGHT Bob", "key 2: requested the hold"),
+        (TdHold::TD_HOLD_UPLINK_SILENT, "", "HOLD: station of FLIGHT Bob (key 2) not received"),
+        (TdHold::TD_HOLD_STATION_DEAF, "", "HOLD: station of FLIGHT Bob (key 2) receives nothing"),
+        (TdHold::TD_HOLD_TAP_OVERDUE, "", "HOLD: no tap of FLIGHT Bob (key 2)"),
+    ] {
+        for crew_first in [true, false] {
+            (rig.hold, rig.phase) = (TdHold::TD_HOLD_NONE, TdPhase::TD_PHASE_PAD_ARMED);
+            rig.hear(&MavMessage::TD_CREW(crew.clone()));
+            rig.run(0.2);
+            rig.actions.clear();
+            let held = MavMessage::TD_CREW(TD_CREW_DATA { held_by: 2, ..crew.clone() });
+            if crew_first {
+                rig.hear(&held);
+            }
+            rig.hold = hold;
+            rig.run(0.2);
+            rig.hear(&held);
+            rig.run(0.2);
+            let entries = entered(&rig);
+            let entry = entries.iter().find(|line| line.kind == "vehicle says" && line.text == words);
+            assert_eq!(entry.map(|line| line.who.as_str()), Some(who), "{words}: {entries:?}");
+            let by_bob = entries.iter().filter(|line| line.who.contains("Bob")).count();
+            assert_eq!(by_bob, usize::from(!who.is_empty()), "{entries:?}");
+        }
+    }
 }
 
 fn heads(rig: &mut Rig) -> Vec<TD_BOOK_HEAD_DATA> {

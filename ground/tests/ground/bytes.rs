@@ -52,25 +52,30 @@ fn shown_by(emulator: &vt100::Parser) -> Vec<String> {
     emulator.screen().rows(0, columns.get()).map(|row| row.trim_end().to_owned()).collect()
 }
 
-/// A terminal behind a line that takes so many bytes a second, and answers what it is asked.
+/// A terminal behind a line that takes so many bytes a second at a moment, and answers what it is
+/// asked.
 struct SlowTerminal {
-    bytes_per_s: f64,
-    /// When it has taken all that was written.
-    free_at: Duration,
-    answers_at: Option<Duration>,
+    bytes_per_s: fn(Duration) -> f64,
+    /// Bytes that it has not taken yet, at this moment, and those of them before a question.
+    waiting: f64,
+    at: Duration,
+    before_question: Option<f64>,
 }
 
 impl SlowTerminal {
     /// Takes a frame that is drawn now, and perhaps a question behind it. Returns when it will have
     /// been taken.
     fn take(&mut self, bytes: usize, asks: bool, now: Duration) -> Duration {
-        self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes as f64 / self.bytes_per_s);
-        self.answers_at = if asks { Some(self.free_at) } else { self.answers_at };
-        self.free_at
+        self.waiting += bytes as f64;
+        self.before_question = if asks { Some(self.waiting) } else { self.before_question };
+        now + Duration::from_secs_f64(self.waiting / (self.bytes_per_s)(now))
     }
 
     fn answers(&mut self, now: Duration) -> bool {
-        self.answers_at.take_if(|at| *at <= now).is_some()
+        let taken = (now - self.at).as_secs_f64() * (self.bytes_per_s)(now);
+        (self.at, self.waiting) = (now, (self.waiting - taken).max(0.0));
+        self.before_question = self.before_question.map(|before| before - taken);
+        self.before_question.take_if(|before| *before <= 0.0).is_some()
     }
 }
 
@@ -84,12 +89,13 @@ fn flight_over(
     profile: &str,
     columns: u16,
     rows: u16,
-    bytes_per_s: Option<f64>,
+    bytes_per_s: Option<fn(Duration) -> f64>,
 ) -> Vec<(Duration, usize, TdPhase)> {
     let mut slow = bytes_per_s.map(|bytes_per_s| SlowTerminal {
         bytes_per_s,
-        free_at: Duration::ZERO,
-        answers_at: None,
+        waiting: 0.0,
+        at: Duration::ZERO,
+        before_question: None,
     });
     let mut vehicle = load_flight(profile).expect("built in").vehicle().expect("sound");
     vehicle.set_pin_out(true);
@@ -132,6 +138,7 @@ fn flight_over(
             if slow.answers(now) {
                 pace.answered(now);
             }
+            pace.check_answer(now);
             model.screen_late = pace.late(now);
         }
         if now >= pace.redraw_at() && pace.waits_for_terminal(now) {
@@ -220,6 +227,55 @@ fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
 
 #[test]
 fn a_slow_terminal_is_not_far_behind_and_says_so() {
-    let frames = flight_over("mk2", 140, 45, Some(2_000.0));
+    let frames = flight_over("mk2", 140, 45, Some(|_| 2_000.0));
     assert!(frames.len() > 20, "it must still move: {} frames", frames.len());
+}
+
+/// The moments and bytes of the frames of a flight, from lift-off to touchdown.
+fn in_flight(frames: &[(Duration, usize, TdPhase)]) -> Vec<(Duration, usize)> {
+    let flies = TdPhase::TD_PHASE_BOOST as u32..TdPhase::TD_PHASE_TOUCHDOWN as u32;
+    let flown = frames.iter().filter(|(.., phase)| flies.contains(&(*phase as u32)));
+    flown.map(|(at, bytes, _)| (*at, *bytes)).collect()
+}
+
+/// The longest time between two frames, s.
+fn longest(frames: &[(Duration, usize)]) -> f64 {
+    frames.windows(2).map(|pair| (pair[1].0 - pair[0].0).as_secs_f64()).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_fast_terminal_gets_ten_frames_a_second_from_the_first_second_of_a_flight_on() {
+    for (columns, rows) in [(80, 24), (140, 45), (200, 50)] {
+        let frames = in_flight(&flight_over("mk2", columns, rows, Some(|_| 1e6)));
+        let from = frames[0].0 + Duration::from_secs(1);
+        let after: Vec<_> = frames.iter().copied().filter(|(at, _)| *at >= from).collect();
+        assert!(longest(&after) <= 0.12, "{columns}x{rows}: {}", longest(&after));
+        let bytes = after.iter().map(|(_, bytes)| *bytes).sum::<usize>() as f64;
+        println!(
+            "{columns}x{rows}: {:.0} B/s",
+            bytes / (after[after.len() - 1].0 - after[0].0).as_secs_f64()
+        );
+    }
+}
+
+/// The line is slow from 16 to 21 s, in the middle of the flight.
+#[test]
+fn the_rate_follows_the_line_within_a_second_both_ways() {
+    const SLOW_S: [f64; 2] = [16.0, 21.0];
+    let is_slow = |at: f64| (SLOW_S[0]..SLOW_S[1]).contains(&at);
+    let rate: fn(Duration) -> f64 =
+        |now| if (16.0..21.0).contains(&now.as_secs_f64()) { 2_000.0 } else { 1e6 };
+    let frames = in_flight(&flight_over("mk2", 80, 24, Some(rate)));
+    let within = |from: f64, until: f64| -> Vec<(Duration, usize)> {
+        frames.iter().copied().filter(|(at, _)| (from..until).contains(&at.as_secs_f64())).collect()
+    };
+    let [begins, ends] = SLOW_S;
+    let first = frames[0].0.as_secs_f64();
+    assert!(first + 2.0 < begins && is_slow(begins), "{first}");
+    assert!(frames[frames.len() - 1].0.as_secs_f64() > ends + 2.0, "{frames:?}");
+    assert!(longest(&within(first + 1.0, begins)) <= 0.12);
+    let slow = within(begins + 1.0, ends);
+    let bytes = slow.iter().map(|(_, bytes)| *bytes).sum::<usize>() as f64;
+    assert!(bytes / (ends - begins - 1.0) < 2_000.0 && slow.len() < 25, "{slow:?}");
+    assert!(longest(&within(ends + 1.0, 1e3)) <= 0.12, "{:?}", within(ends, 1e3));
 }

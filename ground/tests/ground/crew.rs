@@ -100,7 +100,8 @@ fn counting() -> Rig {
 
 fn holds(rig: &mut Rig) -> usize {
     let sent = rig.take_commands();
-    sent.iter().filter(|sent| sent.command == HOLD && sent.param1.to_bits() == 0).count()
+    let holds = sent.iter().filter(|sent| sent.command == HOLD && sent.param1.to_bits() == 0);
+    holds.inspect(|sent| assert!(sent.param2.to_bits() == 1.0_f32.to_bits(), "no person: {sent:?}")).count()
 }
 
 #[test]

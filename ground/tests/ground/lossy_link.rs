@@ -1,10 +1,11 @@
-//! An abort over a link that loses half of the frames in both directions: the real station and the
-//! real vehicle on one simulated clock.
+//! An abort, a hold and a disarm over a link that loses half of the frames or more in both
+//! directions: the real station and the real vehicle on one simulated clock.
 
 use std::time::Duration;
 
+use flight::computer::LogState;
 use ground::key::Key;
-use ground::model::{CommandKind, Model};
+use ground::model::{CommandKind, Model, Seat, Settings};
 use ground::update::{Action, Msg, update};
 use protocol::command::CommandRequest;
 use protocol::dialect::MavCmd;
@@ -12,6 +13,7 @@ use protocol::frame::{Encoder, Frame};
 use protocol::identity::GROUND;
 use sim::wire::endpoint::{VehicleEndpoint, VehicleKind, step};
 use sim::wire::fly::{StartPoint, load_flight};
+use sim::wire::vehicle::Vehicle;
 
 use crate::rig::settings;
 
@@ -19,14 +21,16 @@ use crate::rig::settings;
 struct Random(u64);
 
 impl Random {
-    fn coin(&mut self) -> bool {
+    /// Below 1,000.
+    fn per_mille(&mut self) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) & 1 == 1
+        (self.0 >> 40) % 1_000
     }
 }
 
-/// A link that delivers half of the frames, with a delay.
+/// A link that loses frames, and delivers the others with a delay.
 struct LossyLink {
+    lost_per_mille: u64,
     random: Random,
     in_transit: Vec<(Duration, Frame)>,
 }
@@ -34,12 +38,12 @@ struct LossyLink {
 impl LossyLink {
     const DELAY: Duration = Duration::from_millis(30);
 
-    fn new(seed: u64) -> Self {
-        Self { random: Random(seed), in_transit: Vec::new() }
+    fn new(seed: u64, lost_per_mille: u64) -> Self {
+        Self { lost_per_mille, random: Random(seed), in_transit: Vec::new() }
     }
 
     fn send(&mut self, frame: Frame, now: Duration) {
-        if self.random.coin() {
+        if self.random.per_mille() >= self.lost_per_mille {
             self.in_transit.push((now + Self::DELAY, frame));
         }
     }
@@ -69,7 +73,7 @@ fn run(seed: u64) -> Run {
     flight.recipe.seed = seed;
     let mut vehicle = flight.vehicle().expect("sound");
     let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(1);
-    let (mut up, mut down) = (LossyLink::new(2 * seed + 1), LossyLink::new(2 * seed + 2));
+    let (mut up, mut down) = (LossyLink::new(2 * seed + 1, 500), LossyLink::new(2 * seed + 2, 500));
     let mut model = Model::new(settings(false, true));
     let mut encoder = Encoder::new(GROUND);
     // The key is pressed at a varying time between the vehicle's frames and the ticks.
@@ -121,7 +125,8 @@ fn run(seed: u64) -> Run {
 
 #[test]
 fn an_abort_through_fifty_per_cent_loss_latches_and_is_acknowledged_in_time() {
-    let runs: Vec<Run> = (0..100).map(run).collect();
+    let runs: Vec<Run> = (0..200).map(run).collect();
+    assert!(runs.iter().all(|run| run.latched_s.is_finite() && run.acknowledged_s.is_finite()));
     let percentile = |of: fn(&Run) -> f64, percent: usize| {
         let mut times: Vec<f64> = runs.iter().map(of).collect();
         times.sort_by(f64::total_cmp);
@@ -129,9 +134,10 @@ fn an_abort_through_fifty_per_cent_loss_latches_and_is_acknowledged_in_time() {
     };
     let (latched, acknowledged) = (|run: &Run| run.latched_s, |run: &Run| run.acknowledged_s);
     println!(
-        "latched: median {:.2} s, p99 {:.2} s; acknowledged: median {:.2} s, p99 {:.2} s; sent at most {} times",
+        "latched: median {:.2} s, p99 {:.2} s, max {:.2} s; acknowledged: median {:.2} s, p99 {:.2} s; sent at most {} times",
         percentile(latched, 50),
         percentile(latched, 99),
+        percentile(latched, 100),
         percentile(acknowledged, 50),
         percentile(acknowledged, 99),
         runs.iter().map(|run| run.sent).max().unwrap_or(0)
@@ -139,4 +145,79 @@ fn an_abort_through_fifty_per_cent_loss_latches_and_is_acknowledged_in_time() {
     assert!(percentile(latched, 99) <= 0.5);
     assert!(percentile(acknowledged, 99) <= 1.2);
     assert!(runs.iter().all(|run| run.sent_afterwards == 0), "it ends once it is latched and answered");
+}
+
+/// Time from the keys to the effect of a hold or a disarm 7 s before the release, s; infinite if it
+/// came too late.
+fn held_after_s(seed: u64, keys: [Key; 2]) -> f64 {
+    let mut flight = load_flight("mk2").expect("built in");
+    flight.recipe.seed = seed;
+    let mut vehicle = Vehicle::on_the_pad(&flight).expect("sound");
+    vehicle.set_log_state(LogState { running: true, space_bytes: u64::MAX });
+    vehicle.set_pin_out(true);
+    let mut endpoint = VehicleEndpoint::new(VehicleKind::Simulated).booted(1);
+    let (mut up, mut down) = (LossyLink::new(2 * seed + 1, 0), LossyLink::new(2 * seed + 2, 0));
+    let mut model = Model::new(Settings { log_path: None, ..settings(false, true) });
+    let mut encoder = Encoder::new(GROUND);
+    let mut pressed_at: Option<Duration> = None;
+    for milliseconds in 0..60_000 {
+        let now = Duration::from_millis(milliseconds);
+        let mut msgs = Vec::new();
+        if vehicle.time_s() <= now.as_secs_f64() {
+            for frame in up.arrived(now) {
+                endpoint.on_frame(0, &frame, &vehicle.state());
+            }
+            step(&mut endpoint, &mut vehicle, &[]);
+            for leaving in endpoint.poll(&vehicle.state()) {
+                down.send(leaving.frame, now);
+            }
+        }
+        msgs.extend(down.arrived(now).into_iter().map(Msg::Frame));
+        let command = |kind| Msg::command(kind, Seat::default());
+        // Armed and started over a good link.
+        if milliseconds == 20_000 {
+            msgs.push(command(CommandKind::Arm));
+        }
+        if milliseconds == 22_000 {
+            msgs.push(command(CommandKind::Start));
+        }
+        let left_s = vehicle.mode().countdown_end_s.map(|end_s| end_s - vehicle.time_s());
+        match (pressed_at, left_s) {
+            (None, Some(left_s)) if left_s <= 7.0 - 0.001 * (seed * 37 % 100) as f64 => {
+                (up.lost_per_mille, down.lost_per_mille) = (600, 600);
+                pressed_at = Some(now);
+                msgs.extend(keys.map(|key| Msg::Keys(vec![key])));
+            }
+            (Some(at), None) if vehicle.phase().on_pad() => return (now - at).as_secs_f64(),
+            (Some(_), None) => return f64::INFINITY,
+            _ => {}
+        }
+        if milliseconds % 100 == 0 || model.wakes_at().is_some_and(|at| now >= at) {
+            msgs.push(Msg::Tick);
+        }
+        for msg in msgs {
+            for action in update(&mut model, msg, now) {
+                let Action::Send(message) = action else { continue };
+                up.send(encoder.encode(&message), now);
+            }
+        }
+    }
+    panic!("seed {seed}: no countdown")
+}
+
+/// Also a silence of the uplink holds: the time of the command counts.
+#[test]
+fn a_hold_and_a_disarm_through_sixty_per_cent_loss_arrive_in_time() {
+    for (name, keys) in [("hold", ['H', '\r']), ("disarm", ['D', '\r'])] {
+        let keys = keys.map(|key| if key == '\r' { Key::Enter } else { Key::Char(key) });
+        let mut times_s: Vec<f64> = (0..20).map(|seed| held_after_s(seed, keys)).collect();
+        times_s.sort_by(f64::total_cmp);
+        println!(
+            "{name}: {} of 20, median {:.2} s, max {:.2} s",
+            times_s.iter().filter(|s| s.is_finite()).count(),
+            times_s[9],
+            times_s[19]
+        );
+        assert!(times_s.iter().all(|time_s| time_s.is_finite()), "{name}: {times_s:?}");
+    }
 }

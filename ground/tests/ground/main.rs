@@ -32,6 +32,7 @@ mod rig;
 mod screens;
 mod slips;
 mod station_log;
+mod surfaces;
 mod terminal;
 mod two_person;
 mod unfinished;

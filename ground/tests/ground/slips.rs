@@ -93,7 +93,7 @@ fn nothing_says_lift_off_before_the_vehicle_has_moved() {
         (phase, row.split('●').nth(1).map(|mark| mark.trim_end_matches(['━', '┄', '◆']).to_owned()))
     };
     rig.run(10.0);
-    assert_eq!(said(&mut rig), ("Told to light".to_owned(), Some("commanded to light".to_owned())));
+    assert_eq!(said(&mut rig), ("IGN COMMANDED".to_owned(), Some("ignition commanded".to_owned())));
     // A motor that did not light: disarmed again, on the pad.
     let mut misfired = armed();
     (misfired.phase, misfired.countdown_ms) = (TdPhase::TD_PHASE_BOOST, -600);
@@ -103,10 +103,10 @@ fn nothing_says_lift_off_before_the_vehicle_has_moved() {
     misfired.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     // After that the row of the commands is free.
     misfired.run(12.0);
-    assert_eq!(said(&mut misfired), ("On the pad".to_owned(), Some("commanded to light".to_owned())));
+    assert_eq!(said(&mut misfired), ("PAD_IDLE".to_owned(), Some("ignition commanded".to_owned())));
     rig.state(0.0, 2.0, 0.0, 12.0, 90.0);
     rig.run(0.1);
-    assert_eq!(said(&mut rig), ("Rising".to_owned(), Some("lift-off".to_owned())));
+    assert_eq!(said(&mut rig), ("BOOST".to_owned(), Some("lift-off".to_owned())));
 }
 
 /// The vehicle gives the gate up by itself.

@@ -4,15 +4,15 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{CommandKind, KeyOwner, Role, Seat, Settings};
+use ground::model::{CommandKind, Ending, KeyOwner, Role, Seat, Settings};
 use ground::update::{Action, Msg, Request};
 use protocol::dialect::{
     ATTITUDE_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd,
     MavMessage, MavModeFlag, MavType, TD_CREW_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_MISSION_DATA,
-    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdMotor, TdPhase, TdRole,
-    VFR_HUD_DATA,
+    TD_OPERATOR_DATA, TD_UPLINK_DATA, TIMESYNC_DATA, TdAct, TdInterlock, TdLatch, TdLimit, TdMotor, TdPhase,
+    TdRole, VFR_HUD_DATA,
 };
-use protocol::identity::{GROUND, PHASE_BITS};
+use protocol::identity::{Address, GROUND, PHASE_BITS};
 
 use crate::keys::ladder;
 use crate::rig::{Rig, SESSION, enter, is_abort, is_arm, settings, typed};
@@ -155,7 +155,7 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
         let [first, second] = [0, 1].map(|row| screen.lines().nth(row).unwrap_or_default());
         assert!(first.contains("TWO VEHICLES under id 1"), "{step}: {screen}");
         assert!(
-            second.contains("Countdown") && second.contains("ARMED") && second.contains("T-8.0"),
+            second.contains("COUNTDOWN") && second.contains("ARMED") && second.contains("T-8.0"),
             "{screen}"
         );
         assert!(screen.contains("also 00000009 PAD_IDLE") && !screen.contains("REBOOTED"), "{screen}");
@@ -217,6 +217,28 @@ fn a_reset_in_the_countdown_is_an_alarm_and_withdraws_what_was_observed() {
     }
 }
 
+/// The countdown that the vehicle shows is another station's.
+#[test]
+fn a_start_that_was_denied_is_not_observed() {
+    for counts_first in [true, false] {
+        let mut rig = Rig::crewed();
+        (rig.armed, rig.phase, rig.armed_here) = (true, TdPhase::TD_PHASE_PAD_ARMED, false);
+        rig.run(1.0);
+        rig.msg(Msg::command(CommandKind::Start, Seat::default()));
+        for step in [counts_first, !counts_first] {
+            if step {
+                rig.countdown_ms = 8_000;
+                rig.run(0.3);
+            } else {
+                rig.answer(START, 2);
+            }
+        }
+        rig.run(1.0);
+        let track = rig.model.commands.of(CommandKind::Start).unwrap();
+        assert!(track.observed_at.is_none() && !track.accepted(), "{track:?}");
+    }
+}
+
 #[test]
 fn a_reset_in_flight_is_an_alarm_until_the_end() {
     let mut rig = counting();
@@ -228,10 +250,14 @@ fn a_reset_in_flight_is_an_alarm_until_the_end() {
         let mut alarms = rig.model.alarms.list().iter();
         alarms.any(|alarm| alarm.is_active() && alarm.what.text == "the vehicle has REBOOTED IN FLIGHT")
     };
-    assert!(held(&rig), "{}", rig.screen(120, 36));
+    let screen = rig.screen(120, 36);
+    assert!(held(&rig) && screen.contains("RESET"), "{screen}");
     rig.phase = TdPhase::TD_PHASE_SAFED;
+    rig.verdict(true, TdLimit::empty());
     rig.run(60.0);
     assert!(held(&rig), "{}", rig.screen(120, 36));
+    let ending = Ending::of(&rig.model.vehicle, rig.now).unwrap().sentence(&rig.model.vehicle);
+    assert!(ending.contains(", after a RESET IN FLIGHT"), "{ending}");
 }
 
 #[test]
@@ -393,6 +419,40 @@ fn what_another_session_armed_is_never_armed_here() {
     rig.take_commands();
     rig.run(5.0);
     assert_eq!(rig.take_commands(), []);
+}
+
+/// A program without a session, and a Touchdown station on a link without a key.
+#[test]
+fn an_arming_a_start_and_an_abort_by_another_station_are_alarms_with_its_address_and_id() {
+    let other = Address { system_id: 254, component_id: 190 };
+    let mut rig = Rig::crewed();
+    rig.armed_here = false;
+    let reports = |rig: &mut Rig, command: &str| {
+        rig.text(&format!("254/190 at 192.0.2.7:14550: {command}"));
+        rig.uplink_of(other, 100, true);
+        rig.run(1.2);
+    };
+    let every_page = |rig: &mut Rig, words: &str| {
+        for page in "123456789?".chars() {
+            rig.key(Key::Char(page));
+            rig.expect_screen(words);
+        }
+        rig.key(Key::Char('1'));
+    };
+    (rig.armed, rig.phase) = (true, TdPhase::TD_PHASE_PAD_ARMED);
+    reports(&mut rig, "arm");
+    every_page(&mut rig, "ALARM ARMED BY ANOTHER STATION: 254/190 at 192.0.2.7:14550");
+    rig.key(Key::Char(' '));
+    rig.countdown_ms = 60_000;
+    reports(&mut rig, "start");
+    every_page(&mut rig, "ALARM COUNTDOWN BY ANOTHER STATION: 254/190 at 192.0.2.7:14550; hold or abort");
+    rig.key(Key::Char(' '));
+    (rig.armed, rig.phase, rig.countdown_ms) = (false, TdPhase::TD_PHASE_PAD_IDLE, i32::MAX);
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
+    rig.latch = TdLatch::TD_LATCH_COMMANDED;
+    rig.text("station 254/190 aborts");
+    reports(&mut rig, "abort");
+    every_page(&mut rig, "ABORT LATCHED: commanded by station 254/190 at 192.0.2.7:14550");
 }
 
 #[test]
@@ -606,7 +666,7 @@ fn a_copter_beside_our_vehicle_under_its_id_is_a_second_vehicle() {
     rig.hear(&copter(1));
     rig.run(0.1);
     assert!(first_line(&rig, 80, 24).contains("TWO VEHICLES under id 1"), "{}", first_line(&rig, 80, 24));
-    assert!(rig.screen(80, 24).contains("On the pad"), "what ours tells stays");
+    assert!(rig.screen(80, 24).contains("PAD_"), "what ours tells stays");
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
     rig.abort();

@@ -50,3 +50,30 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     let told = phases(computer, stood);
     assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
 }
+
+/// The crew searches at the estimated position.
+#[test]
+fn a_vehicle_at_rest_without_gnss_has_a_position_at_rest() {
+    for (mission, fault) in [
+        ("mk2", Some("gnss-out@powered")),
+        ("mk3", Some("gnss-out@armed")),
+        ("mk3", Some("gnss-out@coast")),
+        ("mk3", Some("gnss-stuck@descent")),
+        ("mk3", None),
+    ] {
+        let mut recipe = Recipe::built_in(mission, "real").unwrap().starting_at(StartPoint::Pad).unwrap();
+        recipe.faults = fault.into_iter().map(|name| name.parse().unwrap()).collect();
+        let mut sortie = Sortie::new(&recipe, 0).unwrap();
+        let run = |sortie: &mut Sortie, seconds: u32| (0..200 * seconds).for_each(|_| drop(sortie.step()));
+        while sortie.computer().mode().phase != Phase::Touchdown {
+            run(&mut sortie, 1);
+        }
+        let position_m = |sortie: &Sortie| sortie.computer().pilot().estimate().unwrap().state.position_m;
+        // Until the motor is out.
+        run(&mut sortie, 5);
+        let before_m = position_m(&sortie);
+        run(&mut sortie, 120);
+        let moved_m = (position_m(&sortie) - before_m).norm();
+        assert!(moved_m < 1.0, "{mission} {fault:?}: {moved_m} m");
+    }
+}

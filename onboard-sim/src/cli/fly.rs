@@ -8,6 +8,7 @@ use anyhow::Context as _;
 use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
+use protocol::background::survive_file_size_limit;
 use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
@@ -23,7 +24,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, logging, recipe};
+use super::{in_wind, logging, notify, recipe};
 
 #[derive(Args)]
 #[command(
@@ -91,7 +92,8 @@ pub(crate) struct FlyArguments {
     /// Break something; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
-    /// Speed of simulated time: a factor, or max.
+    /// Speed of simulated time: a factor, or max. On the pad with a crew, at most real time: the
+    /// vehicle judges its uplink by the age of the last heartbeat. --auto waits for no crew.
     #[arg(long, default_value = "1")]
     speed: Speed,
     /// Arm and start without a ground station, also with --mavlink.
@@ -111,6 +113,10 @@ pub(crate) struct FlyArguments {
     json: bool,
 }
 
+/// Note on the speed of a flight that waits for a crew.
+const PAD_SPEED: &str = "onboard-sim: on the pad a vehicle with a crew runs at real time, because it judges its uplink by the age of \
+    the last heartbeat; --auto waits for no crew";
+
 pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<Exit> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(fly(arguments))
@@ -129,6 +135,7 @@ impl FlyArguments {
 }
 
 async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
+    survive_file_size_limit().context("handling the limit of the file size")?;
     let (flight, as_json_object) = (arguments.flight()?, arguments.json);
     let crew = arguments.crew.as_deref().map(CrewFile::open).transpose()?;
     let log = arguments.log.as_ref().filter(|path| *path != Path::new("none"));
@@ -143,6 +150,9 @@ async fn fly(arguments: FlyArguments) -> anyhow::Result<Exit> {
     };
     // People may be at it: an automatic flight gives no warning.
     let crewed = !arguments.auto && !arguments.mavlink.is_empty();
+    if crewed && !matches!(arguments.speed, Speed::Factor(factor) if factor <= 1.0) {
+        notify(PAD_SPEED);
+    }
     // Beside the first of these that the vehicle has: they make it the same vehicle when it is
     // switched on again.
     let own = arguments.uid_file.as_ref().or(arguments.key.as_ref()).or(log);

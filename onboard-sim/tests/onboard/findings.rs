@@ -16,7 +16,7 @@ const BREAKS: [(&str, &[Sign]); 18] = [
     ("barometer-out@coast", &[Sign::Barometer]),
     ("barometer-step:-20@descent+1", &[Sign::HeightsDisagree]),
     ("lidar-out@descent", &[Sign::Lidar]),
-    ("accelerometer-dead@descent", &[Sign::Accelerometer]),
+    ("accelerometer-dead@descent", &[Sign::Repeats(0)]),
     ("fin-stuck:2@apogee", &[Sign::Surface(4)]),
     ("gimbal-stuck@powered+0.3", &[Sign::Surface(0), Sign::Surface(1)]),
     ("gimbal-jams:4@powered", &[Sign::Surface(0)]),

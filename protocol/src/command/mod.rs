@@ -82,6 +82,11 @@ impl CommandRequest {
         number_in(self.params[1])
     }
 
+    /// Why the station itself requests a hold; `None` if a person does.
+    pub fn station_hold(&self) -> Option<StationHold> {
+        StationHold::ALL.into_iter().find(|why| why.parameter().to_bits() == self.params[1].to_bits())
+    }
+
     /// Reads parameter 7 of a command that can move something. Other ground stations leave it at 0
     /// or NaN.
     pub fn addressed_boot(&self) -> AddressedBoot {
@@ -100,6 +105,31 @@ impl CommandRequest {
     /// Returns whether the request is this MAV_CMD.
     pub fn is(&self, command: MavCmd) -> bool {
         self.command == command as u16
+    }
+}
+
+/// Why a station requests a hold that no person has requested.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StationHold {
+    NoScreen = 1,
+    TwoVehicles,
+    LogFails,
+}
+
+impl StationHold {
+    const ALL: [Self; 3] = [Self::NoScreen, Self::TwoVehicles, Self::LogFails];
+
+    /// Parameter 2 of MAV_CMD_DO_PAUSE_CONTINUE, below every command number.
+    pub fn parameter(self) -> f32 {
+        f32::from(self as u8)
+    }
+
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::NoScreen => "no commanding screen",
+            Self::TwoVehicles => "TWO VEHICLES",
+            Self::LogFails => "the station's log fails",
+        }
     }
 }
 

@@ -36,36 +36,38 @@ fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            say(&format!("{:#}", anyhow::Error::from(error)));
+            print_note(&format!("{:#}", anyhow::Error::from(error)));
             ExitCode::FAILURE
         }
     }
 }
 
 fn run(cli: &Cli) -> Result<(), ExportError> {
-    let asked = cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd"));
-    let (output, exported) = export(&cli.log, cli.with.as_deref(), &asked)?;
+    let requested = cli.output.clone().unwrap_or_else(|| cli.log.with_extension("rrd"));
+    let (output, exported) = export(&cli.log, cli.with.as_deref(), &requested)?;
     let logs = [Some(&cli.log), cli.with.as_ref()].into_iter().flatten();
     logs.zip(&exported).for_each(|(log, exported)| warn(log, exported));
     let (poses, events) = exported.first().map_or((0, 0), |own| (own.poses, own.events));
-    say(&format!("{}: {poses} poses, {events} events", output.display()));
+    print_note(&format!("{}: {poses} poses, {events} events", output.display()));
     Ok(())
 }
 
 fn warn(log: &Path, exported: &Exported) {
     let log = log.display();
     if let Some(damage) = &exported.damage {
-        say(&format!("warning: {log} is damaged: {damage}; everything before was exported"));
+        print_note(&format!("warning: {log} is damaged: {damage}; everything before was exported"));
     }
     if let Some(problem) = &exported.mission_problem {
-        say(&format!("warning: {log}: its mission cannot be used, so its measures are missing: {problem}"));
+        print_note(&format!(
+            "warning: {log}: its mission cannot be used, so its measures are missing: {problem}"
+        ));
     }
     if exported.poses == 0 {
-        say(&format!("warning: {log} has no pose of the rocket: the space stays empty"));
+        print_note(&format!("warning: {log} has no pose of the rocket: the space stays empty"));
     }
 }
 
 /// Writes a line to standard error; a closed standard error is ignored.
-fn say(text: &str) {
+fn print_note(text: &str) {
     let _ = writeln!(std::io::stderr(), "replay-rerun: {text}");
 }

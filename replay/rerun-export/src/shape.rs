@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_airframe_stands_on_its_own_feet_and_an_unknown_one_clear_of_its_bell() {
+    fn a_known_airframe_stands_on_its_feet_and_an_unknown_one_clear_of_its_nozzle() {
         let mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
         let airframe = &mission.airframe;
         let shape = RocketShape::of_airframe(airframe, mission.motor_curve.propellant_mass_kg());

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::settings::{SettingError, settings_of_mission};
 
 /// A setting in which two missions differ; `None`: it is not in that text, and has its default or
-/// means nothing there.
+/// has no meaning there.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SettingDifference {
     pub(crate) setting: String,

@@ -113,8 +113,8 @@ fn lost_samples([ours, theirs]: [&BTreeMap<String, Series>; 2], shift_s: f64) ->
         let ends = |series: &Series, shift_s: f64| {
             Some([series.times_s.first()? + shift_s, series.times_s.last()? + shift_s])
         };
-        let (Some(own), Some(other)) = (ends(ours, 0.0), ends(theirs, shift_s)) else { continue };
-        let span = [own[0].max(other[0]), own[1].min(other[1])];
+        let (Some(first), Some(second)) = (ends(ours, 0.0), ends(theirs, shift_s)) else { continue };
+        let span = [first[0].max(second[0]), first[1].min(second[1])];
         let count = |series: &Series, shift_s: f64| {
             let before = |time_s: f64| series.times_s.partition_point(|at_s| at_s + shift_s <= time_s);
             before(span[1]).saturating_sub(before(span[0]))

@@ -43,7 +43,7 @@ pub struct Series {
     pub times_s: Vec<f64>,
     pub values: Vec<f64>,
     /// Whether the values are whole numbers, which are held between samples.
-    pub whole: bool,
+    pub is_integer: bool,
 }
 
 impl Series {
@@ -53,7 +53,7 @@ impl Series {
         let behind = self.times_s.partition_point(|t| *t <= time_s + SAME_S);
         let before = behind.checked_sub(1)?;
         let (t0, v0) = (*self.times_s.get(before)?, *self.values.get(before)?);
-        if self.whole || (time_s - t0).abs() <= SAME_S {
+        if self.is_integer || (time_s - t0).abs() <= SAME_S {
             let ended = behind == self.times_s.len() && time_s > t0 + SAME_S;
             return (!ended).then_some(v0);
         }
@@ -112,8 +112,10 @@ impl Flown {
             read.resize_with(read.len().max(row.table + 1), Vec::new);
             let columns = &mut read[row.table];
             if columns.is_empty() {
-                let series =
-                    |column: &Column| Series { whole: column.kind == Kind::Integer, ..Series::default() };
+                let series = |column: &Column| Series {
+                    is_integer: column.kind == Kind::Integer,
+                    ..Series::default()
+                };
                 columns.extend(
                     shape.columns.iter().map(|column| is_signal(&column.name).then(|| series(column))),
                 );
@@ -142,12 +144,17 @@ impl Flown {
                 signals.extend(series.map(|series| (format!("{}.{}", shape.name, column.name), series)));
             }
         }
-        let lit = |signal: &str| {
-            let lit = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
+        let ignited = |signal: &str| {
+            let ignited = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
             let series = signals.get(signal)?;
-            series.times_s.iter().zip(&series.values).find(|(_, phase)| lit(**phase)).map(|(at_s, _)| *at_s)
+            series
+                .times_s
+                .iter()
+                .zip(&series.values)
+                .find(|(_, phase)| ignited(**phase))
+                .map(|(at_s, _)| *at_s)
         };
-        let ignition_s = lit("computer_frame.output.phase").or_else(|| lit("telemetry.phase"));
+        let ignition_s = ignited("computer_frame.output.phase").or_else(|| ignited("telemetry.phase"));
         Ok(Self {
             name,
             signals,
@@ -196,13 +203,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_read_between_samples_and_whole_numbers_are_held() {
-        let mut series = Series { times_s: vec![0.0, 1.0, 2.0], values: vec![0.0, 10.0, 0.0], whole: false };
+    fn real_values_are_interpolated_and_integers_are_held() {
+        let mut series =
+            Series { times_s: vec![0.0, 1.0, 2.0], values: vec![0.0, 10.0, 0.0], is_integer: false };
         assert_eq!(series.at(0.5), Some(5.0));
         assert_eq!(series.at(2.0), Some(0.0));
         assert_eq!(series.at(2.1), None);
         assert_eq!(series.at(-0.1), None);
-        series.whole = true;
+        series.is_integer = true;
         assert_eq!(series.at(1.9), Some(10.0));
         assert_eq!(series.at(2.1), None);
     }

@@ -432,7 +432,7 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
         speed_share,
     };
     let burnt = match commanded_s {
-        None => Err("the motor was not lit".to_owned()),
+        None => Err("the motor was not ignited".to_owned()),
         Some(at_s) => sound::check(trace, &series.frames[series.fallen - 1..], true)
             .and_then(|()| series.burn(at_s, priors.clone(), updraught_m_s)),
     };

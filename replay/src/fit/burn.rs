@@ -108,7 +108,7 @@ pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) 
     if burning.len() < FEWEST || peak_n <= 0.0 {
         bail!("has fewer than {FEWEST} rows with thrust");
     }
-    // A tenth of the burn before and after tells the tare.
+    // The tare is measured over a tenth of the burn time before and after it.
     let lasted_s = rows[last].0 - rows[first].0;
     let near = |row: &&(f64, f64)| {
         row.0 >= rows[first].0 - 0.1 * lasted_s - 0.2 && row.0 <= rows[last].0 + 0.1 * lasted_s + 0.2

@@ -1,4 +1,4 @@
-//! By how much intervals are wider than a flight's own noise says.
+//! Widens intervals beyond the noise of a flight.
 //!
 //! A fit knows the noise of its samples, and not what its models lack: a crooked inertial unit, a
 //! shape of the thrust that five cosines do not follow, gusts that are not the military standard's.
@@ -109,7 +109,7 @@ mod tests {
 
     /// 0.03 of noise and 0.04 that the models lack are 0.05.
     #[test]
-    fn val_hand_a_vehicle_has_its_own_row_and_another_the_widest() {
+    fn val_hand_a_calibrated_vehicle_uses_its_row_and_another_one_the_widest() {
         let table: Table = toml::from_str(
             "sets = ['real']\nflights = 7\nseed = 1\n[vehicles.a]\nthrust_scale = 0.04\nlidar_noise = 'grass'\n\
              [vehicles.b]\nthrust_scale = 0.0\nlidar_noise = 0.1\n",

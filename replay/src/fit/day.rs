@@ -1,4 +1,4 @@
-//! What all flights so far tell of a motor lot, an airframe and a site, and what the next flight
+//! Estimates from all flights so far: a motor lot, an airframe and a site, and what the next flight
 //! may expect of them.
 //!
 //! * [`Posterior`]: a lot's mean and scatter, from the prior of a set of dispersions and the burns
@@ -30,7 +30,7 @@ use statrs::function::beta::beta;
 
 use super::lot::{Prediction, Trial, burnt, burnt_weighted, distances, draw_next, predict, weight};
 use super::{Basis, Fit, Parameter, Pooled, Z_95, pooled};
-use crate::cli::{Answer, say, text_of};
+use crate::cli::{Answer, print_note, text_of};
 use crate::print::{columns, counted};
 use crate::settings::{Setting, mission_toml_with, mission_with};
 use onboard_sim::files::{new_folder, write_folder};
@@ -119,6 +119,8 @@ pub struct Learnt {
     /// Mean wind at the site, lowest and highest of an even distribution, m/s.
     pub wind_m_s: [f64; 2],
     pub flights: usize,
+    /// Simulated flights that landed.
+    pub landed: usize,
     /// `None` if the day was not flown.
     pub prediction: Option<Prediction>,
     /// How the flights so far ended.
@@ -222,7 +224,8 @@ fn learn(fits: &[Fit], ask: &Arguments, mission_toml: &str, set_toml: &str) -> R
         airframe,
         slow_gimbal,
         wind_m_s,
-        flights: trials.map_or(0, |trials| trials.len()),
+        flights: trials.as_ref().map_or(0, Vec::len),
+        landed: trials.map_or(0, |trials| trials.iter().filter(|trial| trial.landed).count()),
         prediction,
         flown,
         expected,
@@ -272,9 +275,8 @@ pub struct Expected {
 const OTHER_WORLD: f64 = 0.1;
 
 impl Expected {
-    /// A mixture: the rates that the simulation thinks possible, and a rate of which nothing is
-    /// known, each with the likelihood of the outcomes (Gelman et al., Bayesian Data Analysis, 3rd
-    /// ed., 2.4 and 7.4).
+    /// A mixture of the rates that the simulation predicts and a uniform rate, each with the
+    /// likelihood of the outcomes (Gelman et al., Bayesian Data Analysis, 3rd ed., 2.4 and 7.4).
     pub fn of(simulated: &Prediction, Outcomes { landed, of, .. }: Outcomes, limit: f64) -> Option<Self> {
         let [landed, lost] = [landed, of - landed].map(|count| count as f64);
         let likelihood = |rate: f64| libm::pow(rate, landed) * libm::pow(1.0 - rate, lost);
@@ -491,7 +493,7 @@ impl Answer for Learnt {
     fn sentences(&self) -> Vec<String> {
         let Self { mission, motor, set, .. } = self;
         let fits = counted(self.sources.len() as u64, "fit");
-        let mut said = vec![
+        let mut lines = vec![
             format!("next day: {mission} with {motor} after {fits}, prior {set}"),
             "lot                  burns      mean   95 % interval       next burn +-   before any burn +-"
                 .to_owned(),
@@ -501,7 +503,7 @@ impl Answer for Learnt {
             let line = format!(
                 "  {name:<18} {burns:>5}  {mean:>8.4}   {interval:<18}  {next_sigma:>12.4}   {prior_sigma:>17.4} {unit}"
             );
-            said.push(line.trim_end().to_owned());
+            lines.push(line.trim_end().to_owned());
         }
         let head = ["burn", "thrust", "burn time", "delay", "weight"].map(str::to_owned);
         let row = |Burn { source, distances, weight }: &Burn| {
@@ -509,29 +511,32 @@ impl Answer for Learnt {
                 distances.map(|far| far.map_or_else(|| "-".to_owned(), |far| format!("{far:+.1}")));
             [source.clone(), thrust, burn_time, delay, format!("{weight:.2}")]
         };
-        said.push("burns, in standard deviations from their median:".to_owned());
+        lines.push("burns, in standard deviations from their median:".to_owned());
         let rows = std::iter::once(head).chain(self.burns.iter().map(row));
-        said.extend(columns(['<', '>', '>', '>', '>'], rows).into_iter().map(|line| format!("  {line}")));
+        lines.extend(columns(['<', '>', '>', '>', '>'], rows).into_iter().map(|line| format!("  {line}")));
         for Pooled { mean: Parameter { name, unit, value, low, high, .. }, .. } in &self.airframe {
             let line = format!("airframe  {name:<16} {value:.4}, {low:.4} to {high:.4} {unit}");
-            said.push(line.trim_end().to_owned());
+            lines.push(line.trim_end().to_owned());
         }
-        said.extend(self.slow_gimbal.iter().map(|(rate_deg_s, source)| {
+        lines.extend(self.slow_gimbal.iter().map(|(rate_deg_s, source)| {
             format!(
                 "SLOW      the gimbal turned at {rate_deg_s:.0} deg/s in {source}: the day is flown with that"
             )
         }));
-        said.extend(self.lot_toml.lines().map(str::to_owned));
+        lines.extend(self.lot_toml.lines().map(str::to_owned));
         let [low, high] = self.wind_m_s;
-        said.push(format!("site      wind {low:.1} to {high:.1} m/s"));
-        let Some(found) = &self.prediction else { return said };
+        lines.push(format!("site      wind {low:.1} to {high:.1} m/s"));
+        let Some(found) = &self.prediction else { return lines };
         let percent = |shares: [f64; 3]| shares.map(|share| 100.0 * share);
         let [rate, low, high] = percent([found.rate, found.low, found.high]);
         let flights = counted(self.flights as u64, "simulated flight");
-        said.push(format!(
-            "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, from {flights} in {set}"
+        let burns = self.burns.len();
+        lines.push(format!("simulated {} of {flights} in {set} landed", self.landed));
+        lines.push(format!(
+            "rate      {rate:.1} %, 95 % interval {low:.1} to {high:.1} %, over all lots that {} and the prior allow",
+            counted(burns as u64, "burn")
         ));
-        let Some(expected) = self.expected else { return said };
+        let Some(expected) = self.expected else { return lines };
         let Outcomes { landed, of, unknown } = self.flown;
         let [trust, rate, low, high] =
             [expected.trust, expected.rate, expected.low, expected.high].map(|share| 100.0 * share);
@@ -539,23 +544,28 @@ impl Answer for Learnt {
             0 => String::new(),
             unknown => format!(" ({} without a verdict not counted)", counted(unknown as u64, "flight")),
         };
-        said.push(format!(
+        lines.push(format!(
             "flown     {landed} of {of} landed{unknown}: the simulation holds with {trust:.0} %; rate {rate:.1} %, 95 % interval {low:.1} to {high:.1} %"
         ));
+        lines.push(format!(
+            "prior     the simulation holds with {:.0} % before any flight; where it does not, any rate is possible: {:+.1} % of the rate",
+            100.0 * (1.0 - OTHER_WORLD),
+            rate - 100.0 * found.rate
+        ));
         let [risk, limit, taken] = percent([expected.risk, self.limit, self.risk]);
-        said.push(format!(
+        lines.push(format!(
             "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken"
         ));
-        said.push(match (self.go == Some(true), may_be_kinder(set)) {
+        lines.push(match (self.go == Some(true), may_be_kinder(set)) {
             (true, false) => "GO".to_owned(),
             (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
             (false, _) => "NO-GO".to_owned(),
         });
         let without_weight = self.burns.iter().find(|burn| burn.weight <= 0.0);
-        said.extend(without_weight.map(|Burn { source, .. }| {
+        lines.extend(without_weight.map(|Burn { source, .. }| {
             format!("NO-GO as long as {source} is here: its burn is not of this lot, or its log is faulty")
         }));
-        said
+        lines
     }
 }
 
@@ -607,7 +617,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// What the fits tell of the next day; `flown` is the mission of the first log.
+    /// The prediction for the next day from the fits; `flown` is the mission of the first log.
     pub(super) fn learn(&self, fits: &[Fit], flown: Option<String>) -> Result<Learnt> {
         let mission_toml = match (&self.mission, flown) {
             (Some(name), _) => text_of(name, flight::vehicles::mission::BUILTIN, "mission")?,
@@ -616,7 +626,7 @@ impl Arguments {
         };
         let set = text_of(&self.prior, sim::dispersion::BUILTIN, "set of dispersions")?;
         if let Some(flights) = self.flights {
-            say(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
+            print_note(&format!("simulates {flights} flights of the day; a thousand take some minutes"));
         }
         let learnt =
             threads(self.jobs.map(NonZeroUsize::get))?.install(|| learn(fits, self, &mission_toml, &set))?;
@@ -625,7 +635,7 @@ impl Arguments {
             let (name, day) = (directory.display(), &learnt.day);
             let files = [("mission.toml", &day.mission_toml), ("dispersion.toml", &day.dispersion_toml)];
             write_folder(&directory, &files)?;
-            say(&format!(
+            print_note(&format!(
                 "onboard-sim campaign --mission {name}/mission.toml --dispersion {name}/dispersion.toml --out flights"
             ));
         }

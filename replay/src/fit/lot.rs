@@ -97,7 +97,7 @@ pub fn draw_next(lots: &[Posterior], chance: &mut Chance) -> Vec<f64> {
     next.collect()
 }
 
-/// The rate over all lots that the posterior thinks possible; `None` without flights.
+/// The landing rate over the posterior of the lots; `None` without flights.
 pub fn predict(lots: &[Posterior], trials: &[Trial], seed: u64) -> Option<Prediction> {
     if trials.is_empty() {
         return None;

@@ -1,5 +1,5 @@
-//! What a flight tells of its vehicle, its motor and its day: values with 95 % intervals, and what
-//! could not be told, with the reason.
+//! Estimates from flight logs of the vehicle, the motor and the weather: values with 95 %
+//! intervals, and the parameters that could not be found, with the reason.
 //!
 //! Only what a real flight's log holds is used: sensor samples, commands, feedback, and the flight
 //! computer's estimates.
@@ -12,10 +12,10 @@
 //! * [`sound`]: whether the accelerometer's samples can be those of the vehicle.
 //! * [`turning`]: the gimbal, from the rotation while the motor burns. [`servo`] is its model.
 //! * [`wind`]: the mean wind, from the force across the nose.
-//! * [`calibration`]: by how much the intervals are wider than the noise says.
+//! * [`calibration`]: by how much the intervals exceed the noise of the samples.
 //!   `examples/fit_coverage.rs` measures whether they hold the truth.
 //! * [`pooled`]: several flights together. [`patched`]: the mission with what was found.
-//! * [`lot`] and [`day`]: what all flights so far tell of the next one.
+//! * [`lot`] and [`day`]: predict the next flight from all flights so far.
 //! * [`least_squares`]: most likely values, where the noise is a slow disturbance.
 
 mod along;
@@ -48,7 +48,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, print_error, say, text_of, warn_of_loss};
+use crate::cli::{Answer, give, print_error, print_note, text_of, warn_of_loss};
 use crate::info::utc;
 use crate::log::Recording;
 use crate::output::NewFile;
@@ -59,8 +59,8 @@ use crate::settings::{Setting, SettingError, mission_toml_with_reasons, mission_
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
 /// A parameter counts as found if its standard deviation is below this fraction of its prior's:
-/// then the flight tells at least eight times as much of it as was known before, and the prior
-/// moves it by less than its own standard deviation over three.
+/// then the flight has at least eight times the information of the prior, and the prior moves the
+/// value by less than a third of its standard deviation.
 const FOUND: f64 = 1.0 / 3.0;
 
 /// A value with its 95 % interval.
@@ -96,7 +96,7 @@ impl Parameter {
     }
 }
 
-/// A parameter of which the flight says too little.
+/// A parameter that the flight does not determine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotFound {
     pub name: String,
@@ -151,7 +151,7 @@ pub struct Fit {
     pub not_calibrated: Vec<NotFound>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
-    /// Whether the flight landed; `None` of a test stand, and of a log that does not say.
+    /// Whether the flight landed; `None` of a test stand, and of a log without a verdict.
     pub landed: Option<bool>,
     /// Names what was recorded: one flight is one flight, under however many names.
     pub content: Option<String>,
@@ -197,7 +197,10 @@ impl Fit {
         let Some(Calibration { vehicles, flights, sets, own }) = &self.calibration else {
             return "not calibrated: those of the noise alone".to_owned();
         };
-        let by = format!("calibrated on {flights} simulated flights in {}", sets.join(" and "));
+        let by = format!(
+            "calibrated on {flights} simulated flights in {} (on other flights about 90 % hold)",
+            sets.join(" and ")
+        );
         if *own {
             return by;
         }
@@ -286,7 +289,7 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
     fit.lacks("mass", "the accelerometer cannot tell a lighter vehicle from more thrust and drag: weigh it");
     fit.lacks(
         "sensors",
-        "an hour on the pad tells their noise and wander better than a flight (Allan variance)",
+        "an hour on the pad shows their noise and drift better than a flight (Allan variance)",
     );
     fit
 }
@@ -369,7 +372,7 @@ fn gimbal(fit: &mut Fit, turning: Result<Solution, String>) {
 }
 
 /// The text of a mission with what a fit found of its vehicle: comments and order stay, and a
-/// changed line says from which flight it is. `flown` is the mission that the fit's scales are
+/// changed line names the flight that it is from. `flown` is the mission that the fit's scales are
 /// over, and `flight` its name and day.
 ///
 /// # Errors
@@ -378,7 +381,7 @@ pub fn patched(mission_toml: &str, flown: &Mission, fit: &Fit, flight: &str) -> 
     let mission = mission_with(mission_toml, &[])?;
     let effective = toml::Value::try_from(&mission)
         .map_err(|error| SettingError::Toml { origin: mission.name.clone(), reason: error.to_string() })?;
-    // Scales are per mass. Where the two cannot be told apart, both have the scale of the sum.
+    // Scales are per mass. Where the two cannot be separated, both have the scale of the sum.
     let airframe = &flown.airframe;
     let per_mass = mission.airframe.mass.loaded_kg / airframe.mass.loaded_kg;
     let apart = ["body_drag_scale", "fin_drag_scale"].iter().all(|name| fit.get(name).is_some());
@@ -417,7 +420,7 @@ pub struct Pooled {
     pub mean: Parameter,
     /// How many flights have it.
     pub flights: usize,
-    /// Standard deviation from flight to flight, without the fits' own errors.
+    /// Standard deviation from flight to flight, without the errors of the fits.
     pub scatter: f64,
 }
 
@@ -491,32 +494,32 @@ pub struct FitReport {
 impl Answer for FitReport {
     fn sentences(&self) -> Vec<String> {
         // Many fits are one answer; JSON has each.
-        let mut said = Vec::new();
+        let mut lines = Vec::new();
         let missions: Vec<&str> = missions(&self.fits).into_iter().collect();
         if self.together.is_empty() {
-            said = self.fits.sentences();
+            lines = self.fits.sentences();
             if missions.len() > 1 {
-                said.push(format!("not put together: these are flights of {}", missions.join(" and ")));
+                lines.push(format!("not put together: these are flights of {}", missions.join(" and ")));
             }
         } else {
             let logs = counted(self.fits.len() as u64, "log");
-            said.extend(self.fits.iter().map(Fit::head));
+            lines.extend(self.fits.iter().map(Fit::head));
             let lacking: Vec<String> = self.fits.iter().flat_map(Fit::lacking).collect();
-            said.extend((!lacking.is_empty()).then(|| "not found".to_owned()));
-            said.extend(lacking);
-            said.push(String::new());
-            said.push(format!(
+            lines.extend((!lacking.is_empty()).then(|| "not found".to_owned()));
+            lines.extend(lacking);
+            lines.push(String::new());
+            lines.push(format!(
                 "together, {logs}: mean with its 95 % interval, and scatter from one to the next"
             ));
         }
-        said.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
+        lines.extend(self.together.iter().map(|Pooled { mean, flights, scatter }| {
             format!("  {}   scatter {} in {flights}", line(mean), digits(*scatter, mean.sigma))
         }));
         if let Some(day) = &self.day {
-            said.push(String::new());
-            said.extend(day.sentences());
+            lines.push(String::new());
+            lines.extend(day.sentences());
         }
-        said
+        lines
     }
 
     fn outcome(&self) -> Exit {
@@ -527,16 +530,16 @@ impl Answer for FitReport {
 
 impl Answer for Fit {
     fn sentences(&self) -> Vec<String> {
-        let mut said = vec![self.head(), format!("95 % intervals, {}", self.widened())];
-        said.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
+        let mut lines = vec![self.head(), format!("95 % intervals, {}", self.widened())];
+        lines.extend(self.found.iter().map(|parameter| format!("  {}", line(parameter))));
         for (title, lacks) in [
             ("not calibrated: the interval is that of the noise alone", &self.not_calibrated),
             ("not found", &self.not_found),
         ] {
-            said.extend(lacks.first().map(|_| title.to_owned()));
-            said.extend(lacks.iter().map(|NotFound { name, reason }| format!("  {name}: {reason}")));
+            lines.extend(lacks.first().map(|_| title.to_owned()));
+            lines.extend(lacks.iter().map(|NotFound { name, reason }| format!("  {name}: {reason}")));
         }
-        said
+        lines
     }
 }
 
@@ -667,7 +670,7 @@ fn write_into(path: &Path, log: &Path, trace: &Trace, found: &Fit) -> Result<()>
     let flight = protocol::text::printable(format!("flight {flight}{day}").as_bytes());
     let text = patched(&text, &trace.mission, found, &flight).context("the mission with what was found")?;
     NewFile::replace(path)?.fill(|file| file.write_all(text.as_bytes()))?;
-    say(&format!("{name}: --mission of `onboard-sim fly`, `campaign` and `card` takes it"));
+    print_note(&format!("{name}: --mission of `onboard-sim fly`, `campaign` and `card` takes it"));
     Ok(())
 }
 
@@ -677,7 +680,7 @@ fn once_each(fits: &mut Vec<Fit>) {
     fits.retain(|fit| {
         let Some(content) = &fit.content else { return true };
         if let Some(first) = known.get(content) {
-            say(&format!("left out: {} is the same as {first}", fit.source));
+            print_note(&format!("left out: {} is the same as {first}", fit.source));
             return false;
         }
         known.insert(content.clone(), fit.source.clone());

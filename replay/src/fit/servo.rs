@@ -28,9 +28,9 @@ impl ServoModel {
         frame_s: f64,
     ) -> Vec<([f64; PARTS], f64)> {
         let delay = (self.delay_s.max(0.0)) / frame_s;
-        let whole = libm::floor(delay);
-        let late = delay - whole;
-        let whole = whole as usize;
+        let frames_late = libm::floor(delay);
+        let late = delay - frames_late;
+        let frames_late = frames_late as usize;
         let half_play_rad = 0.5 * self.play_rad.max(0.0);
         let part_s = frame_s / PARTS as f64;
         let (mut horn_rad, mut load_rad) = (rests_rad, rests_rad);
@@ -41,7 +41,7 @@ impl ServoModel {
             .map(|frame| {
                 // In this frame it obeys first the older command, and after the rest of the delay
                 // the newer one.
-                let (older, newer) = (given(frame, whole + 2), given(frame, whole + 1));
+                let (older, newer) = (given(frame, frames_late + 2), given(frame, frames_late + 1));
                 let parts = core::array::from_fn(|part| {
                     let from = part as f64 / PARTS as f64;
                     let of_older = ((late - from) * PARTS as f64).clamp(0.0, 1.0);
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_of_whole_frames_delays_by_whole_frames() {
+    fn an_integer_delay_shifts_by_that_many_frames() {
         let servo = ServoModel { delay_s: 0.02, rate_rad_s: 1e6, play_rad: 0.0, limit_rad: 0.12 };
         let commands: Vec<f64> = (1..10).map(|k| 0.01 * f64::from(k)).collect();
         let found = ends(&servo, &commands);

@@ -23,9 +23,9 @@ pub struct Frame {
     /// End of the frame, s.
     pub time_s: f64,
     pub measured: Measurements,
-    /// Fin openings as the feedback tells them at the end of the frame, rad.
+    /// Fin openings by the feedback at the end of the frame, rad.
     pub fins_rad: [f64; 4],
-    /// The gimbal's angles as its feedback tells them at the end of the frame, rad.
+    /// Gimbal angles by the feedback at the end of the frame, rad.
     pub gimbal_reported_rad: [f64; 2],
     /// The gimbal's command that is given at the end of the frame, rad.
     pub gimbal_rad: [f64; 2],
@@ -75,9 +75,9 @@ pub struct Trace {
     pub frames: Vec<Frame>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
-    /// Whether the flight landed, if the log says so.
+    /// Whether the flight landed, if the log has a verdict.
     pub landed: Option<bool>,
-    /// Tells what was recorded from any other flight.
+    /// Hash that identifies the recorded flight.
     pub content: Option<u64>,
     /// When the log ends, ns of Unix time.
     pub last_ns: Option<u64>,
@@ -132,7 +132,7 @@ impl Trace {
     /// Reads a vehicle's log.
     ///
     /// # Errors
-    /// It says what the log lacks: it cannot be read, is too long, or has several flights, no
+    /// Names what the log lacks: it cannot be read, is too long, or has several flights, no
     /// usable mission, or no frames.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
         Self::of(&Recording::open(path)?)
@@ -169,7 +169,7 @@ impl Trace {
         if trace.frames.is_empty() { Err(nothing()) } else { Ok(trace) }
     }
 
-    /// Adds a recorded frame; an error names what this build does not know.
+    /// Adds a recorded frame; an error names a value that this build does not support.
     fn take(
         &mut self,
         ComputerFrame { input, output, .. }: &ComputerFrame,

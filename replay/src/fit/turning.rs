@@ -7,8 +7,8 @@
 //! part of the model: treated as noise without memory it would pass for an effect of the commands
 //! (L. Ljung, System Identification, 2nd edition, section 13.4).
 //!
-//! The data's inertia cannot be told from the gimbal's gain, and a centre of gravity beside the
-//! axis not from a crooked nozzle: gain and misalignment are those of the whole.
+//! Inertia and gimbal gain cannot be separated, nor a centre of gravity off the axis and a
+//! misaligned nozzle: gain and misalignment are those of the sum.
 
 use flight::computer::FRAME_S;
 use flight::vehicle::airframe::Airframe;
@@ -31,7 +31,7 @@ const LINK: usize = 6;
 
 /// Noise of a feedback potentiometer, rad: a tenth of a degree.
 const FEEDBACK_RAD: f64 = 0.001_745;
-/// Fewer frames of burn (half a second) tell nothing.
+/// Fewer frames of burn (half a second) determine nothing.
 const FEWEST_FRAMES: usize = 100;
 /// The frames before the thrust in which the servo may already move.
 const LEAD_FRAMES: usize = 60;
@@ -73,11 +73,11 @@ struct Sample {
 /// Fits the gimbal over the burn; an error is the reason why it cannot be.
 pub(super) fn fit_turning(trace: &Trace, along: &Along) -> Result<Solution, String> {
     along.burn_seen_s.clone()?;
-    let begins_s = along.begins_s().ok_or("the motor was not lit")?;
+    let begins_s = along.begins_s().ok_or("the motor was not ignited")?;
     let frames = falling(trace);
-    let lit = frames.partition_point(|frame| frame.time_s < begins_s);
-    let first = lit.saturating_sub(LEAD_FRAMES).max(1);
-    if frames.len() < lit + FEWEST_FRAMES {
+    let ignited = frames.partition_point(|frame| frame.time_s < begins_s);
+    let first = ignited.saturating_sub(LEAD_FRAMES).max(1);
+    if frames.len() < ignited + FEWEST_FRAMES {
         return Err("less than half a second of burn was recorded".to_owned());
     }
     let settles = first.saturating_sub(SETTLING_FRAMES).max(1);

@@ -2,7 +2,7 @@
 //!
 //! In a fall only the air pushes sideways. Every tenth of a second the wind is solved for that
 //! makes the airframe's data, with the drag that was found along the nose, push as the
-//! accelerometer felt. The mean over the fall is that of a wind that grows by the power law, with
+//! accelerometer measured. The mean over the fall is that of a wind that grows by the power law, with
 //! horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one gust, and
 //! that is what makes the mean uncertain.
 
@@ -79,7 +79,7 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
         }
     }
     // What does not average out over a fall: a wrong attitude turns the fall's own speed into wind,
-    // a biased accelerometer feels wind, and the drag is known as well as it was found.
+    // a biased accelerometer measures wind, and the drag has the error of its fit.
     let of_last = fall.last().map(|frame| frame.estimate.sigmas);
     let count = samples.len() as f64;
     let mean = |of: fn(&Sample) -> f64| samples.iter().map(of).sum::<f64>() / count;
@@ -97,7 +97,7 @@ pub(super) fn fit_wind(trace: &Trace, along: &Along) -> Result<Vec<Parameter>, &
     Ok(found.collect())
 }
 
-/// Whether the flight computer's wind is one wind over the fall; an error says how far it is not.
+/// Whether the flight computer's wind is one wind over the fall; an error gives the deviation.
 /// Where it swings, the computer blames on the wind what comes from elsewhere (the suction at a
 /// barometer's port, an attitude that is 10 degrees off), and neither its way through the air nor
 /// its biases can be used.
@@ -140,7 +140,7 @@ fn gusts(samples: &[Sample], at_20_ft_m_s: f64) -> Whitener {
     Whitener::new(steps)
 }
 
-/// The wind over some frames; `None` if the force tells none.
+/// The wind over some frames; `None` if the force does not determine it.
 fn sample(trace: &Trace, along: &Along, frames: &[Frame]) -> Option<Sample> {
     let mass = trace.mass_model().at(0.0);
     let middle = &frames[frames.len() / 2];

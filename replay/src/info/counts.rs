@@ -135,19 +135,24 @@ impl FrameCounter {
         self.start = true;
     }
 
-    /// Counts a frame and the records lost before it.
-    pub(super) fn count(&mut self, frame: u64, lost_before: u32) {
+    /// Counts a frame and the records lost before it. Returns whether the computer was reset between
+    /// it and the frame before.
+    pub(super) fn count(&mut self, frame: u64, lost_before: u32) -> bool {
         let before = self.order.last_frame;
+        let mut reset = false;
         if let Some(gap) = self.order.note(frame, lost_before) {
             self.lost += 1;
             self.first_lost.get_or_insert(gap);
         } else if self.bounds.is_some() {
             self.restarts += usize::from(frame > before.saturating_add(1));
+            // A frame that was late is no reset.
+            reset = frame > before.saturating_add(2);
         }
         // A number that is not above every one before it.
         self.repeated += u64::from(self.bounds.is_some_and(|(_, last)| frame <= last));
         let (first, last) = self.bounds.unwrap_or((frame, frame));
         self.bounds = Some((first.min(frame), last.max(frame)));
+        reset
     }
 
     pub(super) fn time(&mut self, timing: &PilotTiming) {
@@ -237,7 +242,7 @@ pub struct PhaseTimeline {
 /// A time in one phase.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhaseSpan {
-    /// Its name, or `unknown (n)`.
+    /// Its name, `unknown (n)`, or [`RESET`].
     pub phase: String,
     /// The source's time of its first record, s.
     pub from_s: f64,
@@ -245,10 +250,15 @@ pub struct PhaseSpan {
     pub until_s: f64,
 }
 
+/// Name of the time between a reset of the flight computer in the air and its first frame.
+pub(crate) const RESET: &str = "RESET";
+
 /// Follows the phase through a log.
 #[derive(Default)]
 pub(super) struct PhaseTracker {
     current: Option<u32>,
+    /// Number of resets of the flight computer in the air.
+    pub(super) resets: u64,
     spans: Vec<PhaseSpan>,
     further_changes: u64,
 }
@@ -266,6 +276,19 @@ impl PhaseTracker {
             && let Some(span) = self.spans.last_mut()
         {
             span.until_s = time_s;
+        }
+    }
+
+    /// Marks a reset of the flight computer, which ended at this time, s, if it was in the air.
+    pub(super) fn reset(&mut self, until_s: f64) {
+        let phase = self.current.and_then(|phase| Phase::from_index(u8::try_from(phase).ok()?));
+        let is_down = matches!(phase, None | Some(Phase::Touchdown | Phase::Safed));
+        if let Some(PhaseSpan { until_s: from_s, .. }) = self.spans.last()
+            && !is_down
+        {
+            let span = PhaseSpan { phase: RESET.to_owned(), from_s: *from_s, until_s };
+            (self.current, self.resets) = (None, self.resets + 1);
+            self.spans.push(span);
         }
     }
 
@@ -412,7 +435,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_change_begins_a_span_and_an_unknown_phase_keeps_its_number() {
+    fn each_change_begins_a_span_and_an_unknown_phase_has_its_number() {
         let mut tracker = PhaseTracker::default();
         for (time_s, phase) in [(0.0, 1), (0.1, 1), (0.2, 9), (0.3, 1), (0.4, 99)] {
             tracker.note(time_s, phase);

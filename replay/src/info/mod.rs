@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::io::{IsTerminal as _, Read};
 use std::path::{Path, PathBuf};
 
+pub(crate) use self::counts::RESET;
 pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, PlanningLatency, SolverWork};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
@@ -115,10 +116,13 @@ impl Seen {
             Entry::ComputerStart(_) => self.frames.start(),
             Entry::PilotTiming(timing) => self.frames.time(timing),
             Entry::ComputerFrame(frame) => {
+                let reset = self.frames.count(frame.record.input.frame, stamped.lost_before);
                 if let Some(time_s) = frame.flight_time_s() {
+                    if reset {
+                        self.vehicle_phases.reset(time_s);
+                    }
                     self.vehicle_phases.note(time_s, frame.record.output.phase);
                 }
-                self.frames.count(frame.record.input.frame, stamped.lost_before);
             }
             _ => {}
         }
@@ -140,6 +144,12 @@ impl Seen {
         });
         let channels = self.channels.into_facts(log.channels(), log.missing_of_all().is_some());
         let verdict = log.verdict().as_ref().map(Verdict::found);
+        let ending = self.ending.words(verdict.as_ref());
+        let resets = self.vehicle_phases.resets;
+        let after_reset = |ending| match resets {
+            0 => ending,
+            _ => format!("{ending}; after {} of the flight computer in flight", counted(resets, "RESET")),
+        };
         let timelines =
             [(PhaseSource::Vehicle, self.vehicle_phases), (PhaseSource::Telemetry, self.telemetry_phases)];
         Info {
@@ -166,7 +176,7 @@ impl Seen {
                 .into_iter()
                 .filter_map(|(source, tracker)| tracker.into_timeline(source))
                 .collect(),
-            ending: self.ending.words(verdict.as_ref()),
+            ending: ending.map(after_reset),
             verdict,
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
             findings: None,
@@ -209,7 +219,7 @@ pub struct Info {
     pub verdict: Option<Verdict>,
     /// Greatest height that was estimated or received, m.
     pub highest_m: Option<f64>,
-    /// How the flight ended, in one sentence, if the log says so.
+    /// How the flight ended, in one sentence, if the log has a verdict.
     pub ending: Option<String>,
     /// What went wrong, first in time; `None` of a log whose flight this build does not run again
     /// as it was.
@@ -243,7 +253,7 @@ impl Info {
     }
 }
 
-/// The version of a log's schema, if it says so, and of this build's.
+/// The version of a log's schema, if recorded, and of this build's.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Schema {
     pub version: Option<String>,
@@ -661,7 +671,7 @@ impl Args {
             return Ok(season.outcome());
         }
         ensure!(!self.csv, "--csv is for a folder of logs, as in `replay info DIR --csv`");
-        // On a terminal the description says it already.
+        // On a terminal the description contains it already.
         let said = !self.json && std::io::stdout().is_terminal();
         give_each(&self.files, self.json, |file| {
             let info = description(file)?;

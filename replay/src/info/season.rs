@@ -12,7 +12,7 @@ use crate::cli::{Answer, logs_of};
 use crate::log::worst_first;
 use crate::print::columns;
 
-/// One log in a line. What it does not say is left empty.
+/// One log in a line. Missing values are empty.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Flown {
     /// When it begins, UTC.
@@ -111,7 +111,7 @@ impl Answer for Season {
         ];
         let row = |flown: &Flown| {
             let Flown { date, vehicle, mut ending, worst_limit, finding, file, .. } = flown.clone();
-            // The worst limit says which limits it kept.
+            // The column of the worst limit makes the list of limits redundant.
             let kept = [", inside ", ", outside "].iter().filter_map(|word| ending.find(word)).min();
             ending.truncate(kept.unwrap_or(ending.len()));
             let [highest, vertical, place] =

@@ -39,8 +39,7 @@ pub struct Clocks {
     /// The latest time since power-up that was received, and when that was, s.
     #[serde(skip)]
     last_boot_s: Option<[f64; 2]>,
-    /// The release as the vehicle told it over the air, s since its power-up: what T+0 follows from
-    /// where no frames are.
+    /// The release as received over the air, s since power-up: T+0 of a log without frames.
     #[serde(skip)]
     received_release_s: Option<f64>,
 }

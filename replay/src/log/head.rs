@@ -10,7 +10,7 @@ use protocol::log::record::{
 };
 use serde::Serialize;
 
-/// What is kept of a head that goes on and on.
+/// Limit on the stored part of a head, bytes.
 const RUN_FACTS_MAX: usize = 10_000;
 const ATTACHMENTS_MAX: usize = 10_000;
 
@@ -55,7 +55,7 @@ pub struct BuildComparison {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct BuildDifference {
     pub fact: String,
-    /// The recorded value; absent if the log does not say.
+    /// The recorded value; absent if the log has none.
     pub recorded: Option<String>,
     /// The value of this build; absent if this build does not record it.
     pub this_build: Option<String>,

@@ -42,7 +42,7 @@ pub(crate) const IN_ORDER_NS: u64 = 1_000_000_000;
 /// Of one time: what the computer starts from at power-up, a frame, what that led to, and the start
 /// at the release.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Place {
+pub(crate) enum Place {
     PowerUp,
     Frame,
     Other,
@@ -51,7 +51,7 @@ enum Place {
 
 impl Place {
     /// The place of a record; a start is that of a release.
-    fn of(topic: &str) -> Self {
+    pub(crate) fn of(topic: &str) -> Self {
         match topic {
             TOPIC_COMPUTER_START => Self::Release,
             TOPIC_COMPUTER_FRAME => Self::Frame,
@@ -346,10 +346,10 @@ pub enum LogError {
         /// What is wrong.
         damage: String,
     },
-    /// MCAP allows any order; a flight is told from its beginning to its end.
+    /// MCAP allows any order; a flight is read from its beginning to its end.
     #[error(
         "{name}: is not in order of time: a record on {topic} comes {back_s:.3} s late, behind one that it belongs before; \
-        `mcap sort` sorts it"
+        `replay recover` puts it in order"
     )]
     NotInOrder { name: String, topic: String, back_s: f64 },
     /// An MCAP file of another program.

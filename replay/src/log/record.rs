@@ -144,7 +144,7 @@ fn decoded<M: Message + Default>(
 }
 
 /// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded
-/// again to be compared with its bytes, this is asked only if they differ.
+/// again to be compared with its bytes, this is called only if they differ.
 pub(crate) fn misread_frame(data: &[u8]) -> Option<String> {
     complaint("touchdown.computer.v1.ComputerFrame", data)
         .map(|complaint| format!("{TOPIC_COMPUTER_FRAME}: {complaint}"))

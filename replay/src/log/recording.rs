@@ -1,4 +1,4 @@
-//! Holds a whole flight in memory, for questions that need more than one pass.
+//! Holds one flight in memory, for questions that need more than one pass.
 //!
 //! Plans and raw frames are left out, so a flight of some minutes takes some tens of megabytes. A
 //! log that is longer than any real flight is refused.
@@ -224,7 +224,7 @@ impl Recording {
         recording.cut = log.flights().cut();
         recording.clocks = log.clocks();
         if let Some(found) = log.verdict() {
-            recording.verdict_received = found.heard;
+            recording.verdict_received = found.is_received;
             recording.verdict = Some(found.verdict);
         }
         recording.head = log.head().clone();

@@ -78,7 +78,7 @@ impl Verdict {
 
     /// The verdict that was found in a log.
     pub(crate) fn found(found: &Found) -> Self {
-        let clock = if found.heard { Clock::Boot } else { Clock::Flight };
+        let clock = if found.is_received { Clock::Boot } else { Clock::Flight };
         Self { clock, ..Self::of(&found.verdict) }
     }
 
@@ -93,10 +93,10 @@ impl Verdict {
 pub(crate) struct Verdicts {
     recorded: Option<v1::LandingVerdict>,
     has_frames: bool,
-    /// What the vehicle said over the air: its limits, its verdict, and whether it had aborted or
-    /// hung under its parachute.
+    /// Messages received from the vehicle: its limits, its verdict, and whether it had aborted or
+    /// was under its parachute.
     limits: Option<TD_TOUCHDOWN_LIMITS_DATA>,
-    heard: Option<TD_LANDING_VERDICT_DATA>,
+    received: Option<TD_LANDING_VERDICT_DATA>,
     aborted: bool,
     under_parachute: bool,
 }
@@ -105,7 +105,7 @@ pub(crate) struct Verdicts {
 pub(crate) struct Found {
     pub(crate) verdict: v1::LandingVerdict,
     /// Its time counts from power-up, because it was received by a ground station.
-    pub(crate) heard: bool,
+    pub(crate) is_received: bool,
 }
 
 impl Verdicts {
@@ -114,16 +114,16 @@ impl Verdicts {
         match &stamped.entry {
             Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
             Entry::ComputerFrame(_) => self.has_frames = true,
-            Entry::RawFrame if !self.has_frames => self.hear(message),
+            Entry::RawFrame if !self.has_frames => self.note_message(message),
             _ => {}
         }
     }
 
-    fn hear(&mut self, message: Option<&MavMessage>) {
+    fn note_message(&mut self, message: Option<&MavMessage>) {
         match message {
             Some(MavMessage::TD_TOUCHDOWN_LIMITS(limits)) => self.limits = Some(limits.clone()),
             Some(MavMessage::TD_LANDING_VERDICT(verdict)) => {
-                self.heard.get_or_insert_with(|| verdict.clone());
+                self.received.get_or_insert_with(|| verdict.clone());
             }
             Some(MavMessage::TD_FLIGHT_STATUS(status)) => {
                 self.aborted |= status.interlocks.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
@@ -135,23 +135,24 @@ impl Verdicts {
 
     /// The vehicle's own verdict; without its frames, the one that was received.
     pub(crate) fn found(&self) -> Option<Found> {
-        let heard = self.heard().filter(|_| !self.has_frames).map(|verdict| Found { verdict, heard: true });
-        heard.or_else(|| Some(Found { verdict: self.recorded.clone()?, heard: false }))
+        let received =
+            self.received().filter(|_| !self.has_frames).map(|verdict| Found { verdict, is_received: true });
+        received.or_else(|| Some(Found { verdict: self.recorded.clone()?, is_received: false }))
     }
 
     /// The verdict that was received, as a record; its time counts from power-up.
-    fn heard(&self) -> Option<v1::LandingVerdict> {
-        let verdict = self.heard.as_ref()?;
-        let told = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
+    fn received(&self) -> Option<v1::LandingVerdict> {
+        let verdict = self.received.as_ref()?;
+        let reported = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
             self.limits.as_ref().map_or(UNREPORTED, |limits| f64::from(limit(limits)))
         };
         let limits = Limits {
             distance_m: f64::INFINITY,
             height_m: f64::INFINITY,
-            vertical_m_s: told(|l| l.vertical_m_s),
-            lateral_m_s: told(|l| l.lateral_m_s),
-            tilt_rad: told(|l| l.tilt_rad),
-            rate_rad_s: told(|l| l.rate_rad_s),
+            vertical_m_s: reported(|l| l.vertical_m_s),
+            lateral_m_s: reported(|l| l.lateral_m_s),
+            tilt_rad: reported(|l| l.tilt_rad),
+            rate_rad_s: reported(|l| l.rate_rad_s),
         };
         let at = Touchdown {
             distance_m: verdict.distance_m.into(),
@@ -189,7 +190,7 @@ fn landing_of(recorded: v1::Landing) -> Landing {
     Landing { stands, upright, envelope, table_2 }
 }
 
-/// Why a recorded verdict cannot be one: each of its words is what its limits say.
+/// Returns how a recorded verdict contradicts its limits.
 pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
     let v1::LandingVerdict { time_s, landing, envelope, borne, table_2, ending: _ } = verdict;
     if !time_s.is_finite() {
@@ -206,24 +207,23 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
         ![value, minimum, maximum].into_iter().all(|number| number.is_finite()) || inside != *passed
     });
     if let Some(LimitResult { name, value, minimum, maximum, passed, .. }) = wrong {
-        let said = if *passed { "inside" } else { "outside" };
-        return Some(format!("{name} {value:?} is said to be {said} {minimum:?} to {maximum:?}"));
+        let side = if *passed { "inside" } else { "outside" };
+        return Some(format!("{name} {value:?} is said to be {side} {minimum:?} to {maximum:?}"));
     }
-    let kept = |limits: &[LimitResult]| limits.iter().all(|limit| limit.passed);
-    // Legs that cannot give way have borne nothing that is told: their envelope decides.
-    let sound = kept(borne) && (!borne.is_empty() || landing.envelope);
-    let told = [sound && landing.upright, landing.upright, kept(envelope), kept(table_2)];
-    let said = landing_of(*landing).flags();
-    let place = (0..4).find(|place| told[*place] != said[*place])?;
-    let is_not = if said[place] { "it says" } else { "it does not say" };
+    let all_passed = |limits: &[LimitResult]| limits.iter().all(|limit| limit.passed);
+    // Legs that cannot give way have no recorded load: their envelope decides.
+    let sound = all_passed(borne) && (!borne.is_empty() || landing.envelope);
+    let computed = [sound && landing.upright, landing.upright, all_passed(envelope), all_passed(table_2)];
+    let recorded = landing_of(*landing).flags();
+    let place = (0..4).find(|place| computed[*place] != recorded[*place])?;
+    let is_not = if recorded[place] { "it says" } else { "it does not say" };
     Some(format!("{is_not} `{}`, against its limits", Landing::WORDS[place]))
 }
 
-/// The message of a raw frame that a ground station has received, decoded once for everybody who
-/// wants it.
+/// The message of a raw frame that a ground station has received.
 pub(crate) fn received_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
-    let heard = stamped.entry == Entry::RawFrame && received_by_ground(channel);
-    if heard { frame_of(&stamped.data)?.decode().ok() } else { None }
+    let is_received = stamped.entry == Entry::RawFrame && received_by_ground(channel);
+    if is_received { frame_of(&stamped.data)?.decode().ok() } else { None }
 }
 
 /// Whether a ground station received the frames of a channel.

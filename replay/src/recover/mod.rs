@@ -30,7 +30,7 @@ pub enum RecoverError {
     /// The file is not an MCAP file, or cannot be read.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// No message could be kept.
+    /// No message could be recovered.
     #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
     Nothing {
         /// The file.
@@ -42,14 +42,14 @@ pub enum RecoverError {
     Write(#[from] WriteError),
 }
 
-/// A stretch of a file that could not be kept.
+/// A stretch of a file that could not be recovered.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Lost {
     /// Its first byte.
     pub from_byte: u64,
     /// Its length.
     pub bytes: u64,
-    /// The times of its messages, s after the first message kept; `None` if the file does not tell.
+    /// The times of its messages, s after the first recovered message; `None` if unknown.
     pub span_s: Option<(f64, f64)>,
     pub reason: String,
 }
@@ -61,24 +61,26 @@ pub struct Recovery {
     pub input: String,
     /// The recovered one.
     pub output: PathBuf,
-    /// Messages kept.
+    /// Messages recovered.
     pub messages: u64,
-    /// Chunks kept.
+    /// Chunks recovered.
     pub chunks: u64,
-    /// Attachments and metadata records kept.
+    /// Attachments and metadata records recovered.
     pub records_about: u64,
-    /// From the first message kept to the last, s.
+    /// From the first recovered message to the last, s.
     pub kept_s: Option<f64>,
     /// What was lost.
     pub lost: Vec<Lost>,
     /// Number of messages by the summary; `None` without an intact one.
     pub messages_counted: Option<u64>,
-    /// Messages of a channel that nothing describes.
+    /// Messages of a channel without a description.
     pub undecodable: u64,
-    /// Messages kept from between the chunks.
+    /// Messages recovered from between the chunks.
     pub beside_chunks: u64,
     /// Some message comes later than one that belongs behind it.
     pub out_of_order: bool,
+    /// How the recovered log is in order; `None` if it was, or if no order was found.
+    pub put_in_order: Option<&'static str>,
     /// The summary is there and its checksum is right; no message is lost without it.
     pub summary_is_intact: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
@@ -86,7 +88,7 @@ pub struct Recovery {
 }
 
 impl Recovery {
-    /// What the recovered log says of itself.
+    /// The metadata of the recovered log.
     fn about(&self) -> Metadata {
         let lost = self.lost.iter().map(|lost| {
             format!("bytes {} to {}: {}", lost.from_byte, lost.from_byte + lost.bytes, lost.reason)
@@ -100,7 +102,7 @@ impl Recovery {
         Metadata { name: METADATA_RECOVERY.to_owned(), metadata: facts }
     }
 
-    /// What was wrong with the log, for the recovered one; `None` if it was whole.
+    /// The damage of the log, also stored in the recovered one; `None` if it was intact.
     pub fn fault(&self) -> Option<String> {
         let mut faults = Vec::new();
         faults.extend(self.lost.first().map(|lost| {
@@ -125,7 +127,9 @@ impl Recovery {
             ));
         }
         if self.out_of_order {
-            faults.push("it is not in order of time (`mcap sort` sorts it)".to_owned());
+            let order =
+                self.put_in_order.unwrap_or("neither its times nor the numbers of its frames give one");
+            faults.push(format!("it was not in order of time: {order}"));
         }
         if self.ended && !self.summary_is_intact {
             faults.push("its summary is damaged, and no message with it".to_owned());
@@ -147,8 +151,8 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     let contents = records.contents()?;
     let input = input.display().to_string();
     let rescue = Rescue::of(output, &mut records, &contents)?;
-    let kept = rescue.kept;
-    let Some((first_ns, last_ns)) = kept.span_ns else {
+    let recovered = rescue.recovered;
+    let Some((first_ns, last_ns)) = recovered.span_ns else {
         let reason = contents.lost.first().map(|lost| lost.reason.clone());
         return Err(RecoverError::Nothing { name: input, reason });
     };
@@ -162,16 +166,17 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     let mut recovery = Recovery {
         input,
         output: PathBuf::new(),
-        messages: kept.messages,
-        chunks: kept.chunks,
-        records_about: kept.records_about,
+        messages: recovered.messages,
+        chunks: recovered.chunks,
+        records_about: recovered.records_about,
         kept_s: Some(since_s(last_ns)),
         lost: contents.lost.iter().map(lost).collect(),
         messages_counted: contents.summary.statistics.as_ref().map(|statistics| statistics.message_count),
-        undecodable: kept.undecodable,
-        beside_chunks: kept.beside_chunks,
-        out_of_order: kept.out_of_order,
-        summary_is_intact: contents.summary.is_whole,
+        undecodable: recovered.undecodable,
+        beside_chunks: recovered.beside_chunks,
+        out_of_order: recovered.out_of_order,
+        put_in_order: recovered.put_in_order,
+        summary_is_intact: contents.summary.is_intact,
         ended: contents.ended,
     };
     recovery.output = rescue.finish(&recovery.about())?;

@@ -65,7 +65,7 @@ pub(crate) struct Contents {
 /// its statistics only if its checksum is right.
 #[derive(Debug, Default)]
 pub(crate) struct FileSummary {
-    pub(crate) is_whole: bool,
+    pub(crate) is_intact: bool,
     pub(crate) schemas: BTreeMap<u16, (SchemaHeader, Vec<u8>)>,
     pub(crate) channels: BTreeMap<u16, Channel>,
     pub(crate) statistics: Option<Statistics>,
@@ -142,8 +142,8 @@ impl Records {
             }
             let next = end_of_head + length;
             if length > RECORD_LIMIT_BYTES as u64 {
-                let whole = self.begins_record(next)?;
-                let until = if whole { next } else { self.next_chunk(at + 1)?.unwrap_or(self.size) };
+                let follows = self.begins_record(next)?;
+                let until = if follows { next } else { self.next_chunk(at + 1)?.unwrap_or(self.size) };
                 contents.lose(at, until - at, None, "a record larger than this program reads");
                 at = until;
                 continue;
@@ -151,8 +151,8 @@ impl Records {
             let body = self.read(end_of_head, length)?;
             if opcode == op::DATA_END {
                 contents.ended = true;
-                let told = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
-                if contents.lost.is_empty() && told != 0 && hasher.finalize() != told {
+                let recorded = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+                if contents.lost.is_empty() && recorded != 0 && hasher.finalize() != recorded {
                     let reason =
                         "the checksum over all data does not fit: something between the records was changed";
                     contents.lose(at, 0, None, reason);
@@ -161,11 +161,11 @@ impl Records {
                 break;
             }
             match contents.check(opcode, &body) {
-                Ok(keeps) => {
+                Ok(is_recovered) => {
                     hasher.update(&[opcode]);
                     hasher.update(&length.to_le_bytes());
                     hasher.update(&body);
-                    if keeps {
+                    if is_recovered {
                         contents.good.push(Good { at, opcode });
                     }
                     at = next;
@@ -213,8 +213,8 @@ impl Records {
                 Ok(Record::Footer(footer)) => {
                     checksum.update(body.get(..FOOTER_CHECKED_BYTES).unwrap_or_default());
                     let ends = self.read(at, mcap::MAGIC.len() as u64 + 1)? == mcap::MAGIC;
-                    summary.is_whole = ends && [0, checksum.finalize()].contains(&footer.summary_crc);
-                    summary.statistics = statistics.filter(|_| summary.is_whole);
+                    summary.is_intact = ends && [0, checksum.finalize()].contains(&footer.summary_crc);
+                    summary.statistics = statistics.filter(|_| summary.is_intact);
                     break;
                 }
                 Err(_) => break,

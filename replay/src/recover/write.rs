@@ -1,15 +1,18 @@
-//! Writes the records that are kept as a whole log.
+//! Writes the recovered records as a complete log.
 
 use std::collections::BTreeMap;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata, Record, op};
+use prost::Message as _;
+use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
+use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
 
 use super::RecoverError;
-use super::scan::{Contents, FileSummary, Records};
-use crate::log::{ComputerOrder, IN_ORDER_NS};
+use super::scan::{Contents, Records};
+use crate::log::{ComputerOrder, IN_ORDER_NS, Place};
 use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -19,28 +22,41 @@ type Writer = mcap::Writer<BufWriter<NewFile>>;
 
 pub(crate) struct Rescue<'a> {
     path: PathBuf,
-    /// The file's summary, for messages whose channel record is lost.
-    summary: &'a FileSummary,
+    /// The parts of the file, with its summary for messages whose channel record is lost.
+    contents: &'a Contents,
     writer: Writer,
     /// The file's schemas, and its channels with their topics, by their numbers there.
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     order: ComputerOrder,
-    pub(crate) kept: Kept,
+    /// Messages that are still to be put in order; `None` while they are written as they come.
+    held: Option<Vec<Held>>,
+    pub(crate) recovered: Recovered,
 }
 
-/// What was kept.
+/// A message with its new channel.
+struct Held {
+    header: MessageHeader,
+    data: Vec<u8>,
+    place: Place,
+    /// Number of a frame; 0 of a start, after which numbers may begin again.
+    frame: Option<u64>,
+}
+
+/// Counts of what was recovered.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Kept {
+pub(crate) struct Recovered {
     pub(crate) span_ns: Option<(u64, u64)>,
     pub(crate) messages: u64,
     pub(crate) chunks: u64,
     pub(crate) records_about: u64,
-    /// Messages whose channel nothing describes.
+    /// Messages of a channel without a description.
     pub(crate) undecodable: u64,
     pub(crate) beside_chunks: u64,
     /// Some message comes later than one that belongs behind it.
     pub(crate) out_of_order: bool,
+    /// How an order was found for them, as text.
+    pub(crate) put_in_order: Option<&'static str>,
 }
 
 impl<'a> Rescue<'a> {
@@ -50,14 +66,26 @@ impl<'a> Rescue<'a> {
         records: &mut Records,
         contents: &'a Contents,
     ) -> Result<Self, RecoverError> {
+        let mut rescue = Self::begin(output, contents, None)?;
+        rescue.add_all(records)?;
+        if rescue.recovered.out_of_order {
+            drop(rescue);
+            rescue = Self::begin(output, contents, Some(Vec::new()))?;
+            rescue.add_all(records)?;
+            rescue.put_in_order().map_err(|error| rescue.failed(error))?;
+        }
+        Ok(rescue)
+    }
+
+    fn begin(output: &Path, contents: &'a Contents, held: Option<Vec<Held>>) -> Result<Self, RecoverError> {
         let file = NewFile::create(output)?;
         let path = output.to_owned();
         let options = mcap::WriteOptions::new()
             .compression(Some(mcap::Compression::Lz4))
             .chunk_size(Some(CHUNK_BYTES))
             .library(&contents.library);
-        let mut rescue = Self {
-            summary: &contents.summary,
+        Ok(Self {
+            contents,
             writer: options
                 .create(BufWriter::new(file))
                 .map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?,
@@ -65,29 +93,64 @@ impl<'a> Rescue<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             order: ComputerOrder::default(),
-            kept: Kept::default(),
-        };
-        for piece in &contents.good {
+            held,
+            recovered: Recovered::default(),
+        })
+    }
+
+    fn add_all(&mut self, records: &mut Records) -> Result<(), RecoverError> {
+        for piece in &self.contents.good {
             let body = records.body(piece.at)?;
-            rescue.keep(piece.opcode, &body)?;
+            self.add(piece.opcode, &body)?;
         }
-        Ok(rescue)
+        Ok(())
     }
 
-    /// Keeps a record, or every record of a chunk.
-    fn keep(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
-        self.kept.beside_chunks += u64::from(opcode == op::MESSAGE && self.kept.chunks > 0);
-        let kept = if opcode == op::CHUNK {
-            self.kept.chunks += 1;
-            // It was read before without an error; a file that has changed since then is lost here.
-            records_of_chunk(body, |record| self.keep_record(record)).map_err(RecordError::into_mcap)
-        } else {
-            parse_record(opcode, body).and_then(|record| self.keep_record(record))
+    /// Writes the held messages by time; where the numbers of the frames contradict their times, as
+    /// they came, each at the earliest at the time of the one before it.
+    fn put_in_order(&mut self) -> mcap::McapResult<()> {
+        let held = self.held.take().unwrap_or_default();
+        let as_they_came: Vec<&Held> = held.iter().collect();
+        let mut by_time = as_they_came.clone();
+        by_time.sort_by_key(|held| (held.header.log_time, held.place));
+        let ascend = |order: &[&Held]| {
+            order.iter().filter_map(|held| held.frame).is_sorted_by(|last, next| last < next || *next == 0)
         };
-        kept.map_err(|source| self.failed(source))
+        let (order, words) = if ascend(&by_time) {
+            (by_time, Some("its records are sorted by time"))
+        } else if ascend(&as_they_came) {
+            let words = "its times contradict the numbers of its frames, whose order is kept: times that went back are replaced";
+            (as_they_came, Some(words))
+        } else {
+            (as_they_came, None)
+        };
+        self.recovered.put_in_order = words;
+        let mut last_ns = 0;
+        for Held { header, data, .. } in order {
+            let mut header = header.clone();
+            if words.is_some() {
+                last_ns = header.log_time.max(last_ns);
+                header.log_time = last_ns;
+            }
+            self.writer.write_to_known_channel(&header, data)?;
+        }
+        Ok(())
     }
 
-    fn keep_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
+    /// Adds a record, or every record of a chunk.
+    fn add(&mut self, opcode: u8, body: &[u8]) -> Result<(), WriteError> {
+        self.recovered.beside_chunks += u64::from(opcode == op::MESSAGE && self.recovered.chunks > 0);
+        let added = if opcode == op::CHUNK {
+            self.recovered.chunks += 1;
+            // It was read before without an error; a file that has changed since then is lost here.
+            records_of_chunk(body, |record| self.add_record(record)).map_err(RecordError::into_mcap)
+        } else {
+            parse_record(opcode, body).and_then(|record| self.add_record(record))
+        };
+        added.map_err(|source| self.failed(source))
+    }
+
+    fn add_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
         match record {
             Record::Schema { header, data } => {
                 let id = self.writer.add_schema(&header.name, &header.encoding, &data)?;
@@ -106,11 +169,11 @@ impl<'a> Rescue<'a> {
             }
             Record::Message { header, data } => self.message(header, &data)?,
             Record::Metadata(metadata) => {
-                self.kept.records_about += 1;
+                self.recovered.records_about += 1;
                 self.writer.write_metadata(&metadata)?;
             }
             Record::Attachment { header, data, .. } => {
-                self.kept.records_about += 1;
+                self.recovered.records_about += 1;
                 self.writer.attach(&mcap::Attachment {
                     log_time: header.log_time,
                     create_time: header.create_time,
@@ -126,32 +189,42 @@ impl<'a> Rescue<'a> {
 
     fn message(&mut self, header: MessageHeader, data: &[u8]) -> mcap::McapResult<()> {
         if !self.find_channel(header.channel_id)? {
-            self.kept.undecodable += 1;
+            self.recovered.undecodable += 1;
             return Ok(());
         }
         let (channel_id, topic) = &self.channels[&header.channel_id];
         let is_broken = self.order.is_broken_by(topic, header.log_time);
         let header = MessageHeader { channel_id: *channel_id, ..header };
-        self.writer.write_to_known_channel(&header, data)?;
-        self.kept.messages += 1;
-        let (first, last) = self.kept.span_ns.unwrap_or((header.log_time, header.log_time));
-        self.kept.out_of_order |= is_broken || last.saturating_sub(header.log_time) > IN_ORDER_NS;
-        self.kept.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
+        if let Some(held) = &mut self.held {
+            let frame = match topic.as_str() {
+                TOPIC_COMPUTER_FRAME => ComputerFrame::decode(data).ok().map(|frame| frame.input.frame),
+                TOPIC_COMPUTER_START => Some(0),
+                _ => None,
+            };
+            held.push(Held { header, data: data.to_vec(), place: Place::of(topic), frame });
+        } else {
+            self.writer.write_to_known_channel(&header, data)?;
+        }
+        self.recovered.messages += 1;
+        let (first, last) = self.recovered.span_ns.unwrap_or((header.log_time, header.log_time));
+        self.recovered.out_of_order |= is_broken || last.saturating_sub(header.log_time) > IN_ORDER_NS;
+        self.recovered.span_ns = Some((first.min(header.log_time), last.max(header.log_time)));
         Ok(())
     }
 
-    /// Whether a channel is known; one whose record is lost is made from the summary.
+    /// Whether a channel is available; one whose record is lost is made from the summary.
     fn find_channel(&mut self, id: u16) -> mcap::McapResult<bool> {
         if self.channels.contains_key(&id) {
             return Ok(true);
         }
-        let Some(told) = self.summary.channels.get(&id) else { return Ok(false) };
-        let schema = match self.summary.schemas.get(&told.schema_id) {
+        let Some(channel) = self.contents.summary.channels.get(&id) else { return Ok(false) };
+        let schema = match self.contents.summary.schemas.get(&channel.schema_id) {
             Some((schema, data)) => self.writer.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
         };
-        let new = self.writer.add_channel(schema, &told.topic, &told.message_encoding, &told.metadata)?;
-        self.channels.insert(id, (new, told.topic.clone()));
+        let new =
+            self.writer.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata)?;
+        self.channels.insert(id, (new, channel.topic.clone()));
         Ok(true)
     }
 

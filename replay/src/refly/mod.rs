@@ -149,7 +149,7 @@ pub fn refly(recording: &Recording, options: &ReflyOptions) -> Result<ReflyRepor
     Ok(refly_flight(recording, options)?.0)
 }
 
-/// Flies a recorded flight again and keeps the flight itself. The frames before the start are the
+/// Flies a recorded flight again and returns the flight. The frames before the start are the
 /// re-flown ones, too: recorded frames may come from another build or be partly lost, and the
 /// flight after the start would not continue them.
 ///
@@ -235,9 +235,8 @@ fn reached(recording: &Recording, rerun: &Rerun, before: &[ComputerFrame]) -> Re
     reached
 }
 
-/// Whether two frames are of the same flight: what was felt, what was decided, and what is
-/// remembered, unless that covers a pad. What only a crew or a log's disk makes different does not
-/// count.
+/// Whether two frames are of the same flight: measurements, decisions and memory, unless the memory
+/// covers a pad. Differences made by a crew or the disk of a log do not count.
 fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) -> bool {
     let compared = |frame: &ComputerFrame| {
         let output = ComputerOutput { answers: Vec::new(), released: false, ..frame.output.clone() };
@@ -247,7 +246,7 @@ fn is_same_flight(now: &ComputerFrame, then: &ComputerFrame, same_memory: bool) 
     compared(now) == compared(then)
 }
 
-/// What of an input the world makes the computer feel, and not its crew, its pad or its log's disk.
+/// The part of an input that the world determines, without crew, pad and disk of the log.
 pub(crate) fn sensed(input: &ComputerInput) -> ComputerInput {
     ComputerInput {
         measured: input.measured,

@@ -162,13 +162,13 @@ fn changed(
     let mut faults = recorded.to_vec();
     for without in &changes.without {
         // `gnss-out` means every one of that name, `gnss-out@5` just that one.
-        let meant = |fault: &TimedFault| {
+        let is_named = |fault: &TimedFault| {
             let given = fault.to_string();
             let name = given.split([':', '@']).next().unwrap_or_default();
             without == EVERY_FAULT || *without == given || without == name
         };
         let before = faults.len();
-        faults.retain(|fault| !meant(fault));
+        faults.retain(|fault| !is_named(fault));
         if faults.len() == before {
             let listed: Vec<String> = recorded.iter().map(ToString::to_string).collect();
             let listed = if listed.is_empty() { "no faults".to_owned() } else { listed.join(" ") };

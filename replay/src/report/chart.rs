@@ -13,7 +13,7 @@ const BELOW: f64 = 18.0;
 const RIGHT: f64 = 10.0;
 const ABOVE: f64 = 16.0;
 const ROW: f64 = 13.0;
-/// Width of a letter, px, at most: SVG does not tell.
+/// Largest width of a letter, px: SVG does not measure text.
 const LETTER: f64 = 7.0;
 /// Units of the inner picture in a px.
 const FINE: f64 = 10.0;
@@ -23,7 +23,7 @@ const UNSEEN: f64 = 3.0;
 const NARROW: f64 = 4.0;
 /// Samples that are this many times the mean gap apart are not joined.
 const FAR_GAPS: f64 = 5.0;
-/// A line whose values differ by less than this share says nothing.
+/// A line whose values differ by less than this share is constant.
 const NOTHING: f64 = 1e-9;
 /// Extent of an axis, over that of the outermost points.
 const ROOM: f64 = 1.12;
@@ -352,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_says_nothing_is_not_drawn() {
+    fn a_constant_line_is_not_drawn() {
         assert_eq!(with_line((0..9).map(|k| (f64::from(k), 4.0)).collect()).svg(), "");
         assert!(!with_line((0..9).map(|k| (f64::from(k), -1e-7 * f64::from(k))).collect()).svg().is_empty());
     }

@@ -46,7 +46,7 @@ const STYLE: &str = include_str!("style.css");
 /// is whole.
 const SCRIPT: &str = include_str!("script.js");
 
-/// The whole page.
+/// The complete page.
 pub(super) fn page(flight: &Flight, info: &Info, sections: &[Section]) -> String {
     let title = format!("Flight report: {}", flight.recording.name);
     let mut body = format!("<header><p>{}</p>\n", escaped(&about(flight, info).join(" \u{b7} ")));

@@ -17,7 +17,7 @@ use protocol::log::v1::Telemetry;
 
 use crate::controller::new_plan;
 use crate::findings;
-use crate::info::{Info, PhaseSpan};
+use crate::info::{Info, PhaseSpan, RESET};
 use crate::log::Recording;
 
 /// Records of the world this close to a frame belong to the same moment, s.
@@ -201,9 +201,9 @@ impl Flight {
     }
 
     /// A value that a ground station knew.
-    pub(super) fn heard(&self, value: impl Fn(&Telemetry) -> Option<f64>) -> Series {
+    pub(super) fn received(&self, value: impl Fn(&Telemetry) -> Option<f64>) -> Series {
         let telemetry = self.recording.telemetry.iter();
-        telemetry.filter_map(|told| Some((self.axis_s(told.time_s), value(told)?))).collect()
+        telemetry.filter_map(|sample| Some((self.axis_s(sample.time_s), value(sample)?))).collect()
     }
 
     /// The record of the world at a time, s, or the first after it.
@@ -261,6 +261,7 @@ fn spans(info: &Info, zero_s: f64) -> Vec<Span> {
         shade: match Phase::ALL.into_iter().find(|phase| phase.name() == span.phase) {
             Some(Phase::Boost | Phase::Powered) => "hot",
             Some(Phase::Deploy | Phase::AeroDescent | Phase::Chute) => "cool",
+            None if span.phase == RESET => "reset",
             _ => "",
         },
     };
@@ -289,25 +290,25 @@ fn track(recording: &Recording, decisions: &[Decision]) -> (Option<&'static str>
         let attitude = decision.estimate.map(|estimate| estimate.state.world_from_body);
         Some(Sample { time_s, phase, state: decision.state?, attitude })
     });
-    let heard = recording.telemetry.iter().map(|told| {
-        let level_m_s = told.north_m_s.zip(told.east_m_s).map(|(north, east)| libm::hypot(north, east));
+    let received = recording.telemetry.iter().map(|sample| {
+        let level_m_s = sample.north_m_s.zip(sample.east_m_s).map(|(north, east)| libm::hypot(north, east));
         let state = [
-            told.north_m,
-            told.east_m,
-            told.altitude_m,
+            sample.north_m,
+            sample.east_m,
+            sample.altitude_m,
             level_m_s,
-            told.climb_m_s,
-            told.tilt_rad,
-            told.turn_rate_rad_s,
+            sample.climb_m_s,
+            sample.tilt_rad,
+            sample.turn_rate_rad_s,
         ];
-        let phase = told.phase.and_then(|phase| Phase::from_index(u8::try_from(phase).ok()?));
+        let phase = sample.phase.and_then(|phase| Phase::from_index(u8::try_from(phase).ok()?));
         let state = state.map(|value| value.unwrap_or(f64::NAN));
-        Sample { time_s: told.time_s, phase, state, attitude: None }
+        Sample { time_s: sample.time_s, phase, state, attitude: None }
     });
     let sources: [(&str, Vec<Sample>); 3] = [
         ("From the simulated truth.", truth.collect()),
         ("From the flight computer's estimate; the log has no truth.", estimated.collect()),
-        (RECEIVED, heard.collect()),
+        (RECEIVED, received.collect()),
     ];
     let found = sources.into_iter().find(|(_, track)| !track.is_empty());
     let Some((source, mut track)) = found else { return (None, Vec::new()) };

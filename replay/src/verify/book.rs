@@ -1,4 +1,4 @@
-//! Prints the books of ground stations, and proves them or says what is broken.
+//! Prints the books of ground stations, and proves them or names the broken link.
 //!
 //! A log of a station holds its book. A log of the vehicle holds the ends of books that stations
 //! sent: whoever changes a station's log cannot change those.
@@ -38,7 +38,7 @@ pub struct BookFound {
     pub signed: u32,
     /// How many entries a vehicle's log covers.
     pub witnessed: u32,
-    /// What is broken; `None` if it is whole.
+    /// The broken link; `None` if the book is intact.
     pub broken: Option<String>,
     /// Why the log could not be read to its end, if so.
     pub damage: Option<String>,
@@ -113,12 +113,12 @@ fn found(log: &Contents, audit: &Audit, trusted: Option<PublicKey>) -> BookFound
         witnessed: audit.witnessed,
         broken: audit.broken.as_ref().map(ToString::to_string),
         damage: log.damage.clone(),
-        story: log.entries.iter().map(told).collect(),
+        story: log.entries.iter().map(sentence).collect(),
     }
 }
 
 /// As in `12:03:07 commanded: ARM commanded, attempt 1 (Ann)`; times are UTC.
-fn told(entry: &BookEntry) -> String {
+fn sentence(entry: &BookEntry) -> String {
     let second = entry.unix_ns / 1_000_000_000;
     let (hour, minute, second) = (second / 3600 % 24, second / 60 % 60, second % 60);
     let who = if entry.who.is_empty() { String::new() } else { format!(" ({})", entry.who) };

@@ -47,10 +47,10 @@ pub(super) struct FlightVerifier {
     world: Option<Result<WorldAgain, String>>,
 }
 
-/// What must follow the last frame, as bytes; empty if nothing must.
+/// Records that must follow the last frame, as bytes; empty if none must.
 #[derive(Default)]
 struct Awaited {
-    thought: Vec<u8>,
+    estimate: Vec<u8>,
     release: Vec<u8>,
 }
 
@@ -59,7 +59,7 @@ struct Awaited {
 struct Parts {
     inputs: Part,
     digests: u64,
-    thoughts: Part,
+    estimates: Part,
     starts: Part,
     verdicts: u64,
     truth: u64,
@@ -92,7 +92,7 @@ impl FlightVerifier {
                 self.unreadable.get_or_insert(reason);
             }
             _ => match log.channel(stamped.channel_id).map(|channel| channel.topic.as_str()) {
-                Some(TOPIC_ESTIMATE) => self.thought(&stamped.data),
+                Some(TOPIC_ESTIMATE) => self.estimate(&stamped.data),
                 Some(TOPIC_TRUTH_SAMPLE) => self.parts.truth += 1,
                 Some(TOPIC_TRANSFORM) => self.parts.transforms += 1,
                 Some(TOPIC_EVENTS) => self.parts.events += 1,
@@ -171,7 +171,7 @@ impl FlightVerifier {
         self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
         let impossible = self.inputs.judge(&frame.record, frame.since_release);
-        // What a missing field was filled with says nothing.
+        // The default of a missing field is no evidence.
         let impossible = impossible.filter(|_| misread_frame(data).is_none());
         self.parts.inputs.recorded += 1;
         self.parts.inputs.compare(impossible.is_none());
@@ -181,7 +181,7 @@ impl FlightVerifier {
         let lost = self.order.note(number, lost_before);
         // A computer that begins at its release can be run again behind a loss on the pad.
         let begins = !self.from_power_up && frame.since_release == Some(1);
-        self.awaited.thought.clear();
+        self.awaited.estimate.clear();
         if self.obstacle.is_some() {
             return;
         }
@@ -204,10 +204,10 @@ impl FlightVerifier {
                         encode_into(&computer.as_start(), &mut self.awaited.release);
                     }
                     if frame.since_release.is_some()
-                        && let Some(thought) = estimate_to_log(computer.pilot())
+                        && let Some(estimate) = estimate_to_log(computer.pilot())
                     {
-                        self.parts.thoughts.recorded += 1;
-                        encode_into(&thought, &mut self.awaited.thought);
+                        self.parts.estimates.recorded += 1;
+                        encode_into(&estimate, &mut self.awaited.estimate);
                     }
                     if let Some(Ok(world)) = &mut self.world {
                         world.follow(frame, computer.computer());
@@ -223,14 +223,14 @@ impl FlightVerifier {
         self.obstacle = obstacle;
     }
 
-    /// Compares what the pilot thought after the last frame.
-    fn thought(&mut self, data: &[u8]) {
-        let awaited = &mut self.awaited.thought;
+    /// Compares the estimate after the last frame.
+    fn estimate(&mut self, data: &[u8]) {
+        let awaited = &mut self.awaited.estimate;
         if awaited.is_empty() {
             // It belongs to a frame that was not run again, or is there twice.
-            self.parts.thoughts.recorded += 1;
+            self.parts.estimates.recorded += 1;
         } else {
-            self.parts.thoughts.compare(awaited == data);
+            self.parts.estimates.compare(awaited == data);
             awaited.clear();
         }
     }
@@ -298,16 +298,16 @@ impl FlightVerifier {
         let digests = part("digests", parts.digests, tally.digests_different);
         let remembers_less =
             "a computer that is run again from its release on does not remember what was before";
-        let thoughts = &parts.thoughts;
-        let missing = thoughts.recorded.saturating_sub(thoughts.compared);
+        let estimates = &parts.estimates;
+        let missing = estimates.recorded.saturating_sub(estimates.compared);
         let why =
             (missing > 0).then(|| format!("{missing} are missing, or belong to no frame that was run again"));
         let alone = || "only --strict flies the flight again".to_owned();
         let flown = self.computer.as_ref().map(|computer| &computer.pilot().mission().name);
-        let other = head.run.get("profile").zip(flown).filter(|(said, flown)| said != flown);
+        let other = head.run.get("profile").zip(flown).filter(|(named, flown)| named != flown);
         let metadata = match other {
-            Some((said, flown)) => Part { different: 1, ..Part::of("metadata", 1) }
-                .because(format!("its run facts name the profile {said}, and it is {flown}")),
+            Some((named, flown)) => Part { different: 1, ..Part::of("metadata", 1) }
+                .because(format!("its run facts name the profile {named}, and it is {flown}")),
             None => Part::of("metadata", 1).because(alone()),
         };
         vec![
@@ -320,7 +320,7 @@ impl FlightVerifier {
             part("frames", tally.compared, tally.different),
             part("outputs", tally.compared, tally.outputs_different),
             if self.remembers_less { digests.because(remembers_less) } else { digests },
-            Part { name: "estimates", why, follows: true, ..thoughts.clone() },
+            Part { name: "estimates", why, follows: true, ..estimates.clone() },
             Part { name: "starts", follows: true, ..parts.starts.clone() },
             Part::of("verdict", parts.verdicts).because(alone()),
             metadata,
@@ -332,5 +332,5 @@ impl FlightVerifier {
     }
 }
 
-/// What an input that nothing contradicts was held to.
+/// The checks that an accepted input has passed.
 const JUDGED: &str = "judged by range and step alone: what decides nothing can be another value inside both";

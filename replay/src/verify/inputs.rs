@@ -1,7 +1,7 @@
 //! Judges the inputs of a flight computer: some values are impossible in any flight.
 //!
-//! What decides nothing could be changed in a log without a divergence. A value far outside of what
-//! any sensor can say, or one that does not follow from the frame before it, gives that away.
+//! An input that decides nothing could be changed in a log without a divergence. A value outside
+//! the range of its sensor, or one that does not follow from the frame before it, reveals the change.
 
 use avionics::log::frame::phase_of;
 use flight::computer::{FRAME_S, flight_time_s};
@@ -31,7 +31,7 @@ const RANGE_MAX_M: f64 = 1_000.0;
 const FIX_AGE_MAX_S: f64 = 60.0;
 /// Larger than any disk, bytes; a flight without a log says `u64::MAX`.
 const SPACE_MAX_BYTES: u64 = 1 << 50;
-/// The log's disk is asked once a second, and nothing fills or empties one faster, bytes.
+/// Largest change of the free space of the log's disk between two queries (1 s), bytes.
 const SPACE_STEP_BYTES: u64 = 1 << 35;
 /// Tolerance for rounding, and for a clock that measures ages, s.
 const ROUNDING_S: f64 = 1e-3;
@@ -53,7 +53,7 @@ struct LastInput {
     in_flight: bool,
     pin_out: bool,
     booster_attached: bool,
-    /// A foot touches the ground, although the landing motor was not lit yet.
+    /// A foot touches the ground before the landing motor is ignited.
     struck: bool,
     battery_v: Option<f64>,
     log_running: bool,
@@ -115,7 +115,7 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
         [gnss.map(|fix| vector(fix.position_m)), gnss.map(|fix| vector(fix.velocity_m_s))];
     let fix_s = gnss.map(|fix| fix.valid_at_s);
     let ages = [-ROUNDING_S, f64::MAX];
-    let told: [Row; 6] = [
+    let feedback: [Row; 6] = [
         ("angle of a servo, rad,", &input.gimbal_rad, within(ANGLE_MAX_RAD)),
         ("angle of a servo, rad,", &input.fins_rad, within(ANGLE_MAX_RAD)),
         ("battery, V,", input.battery_v.as_slice(), [0.0, BATTERY_MAX_V]),
@@ -123,7 +123,7 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
         ("age of the commander, s,", commander_age_s.as_slice(), ages),
         ("time of a fix, s,", fix_s.as_slice(), [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S]),
     ];
-    // A sensor that is silent or broken says NaN.
+    // A sensor that is silent or broken reports NaN.
     let measured: [Row; 6] = [
         ("gyro, rad/s,", &gyro, within(RATE_MAX_RAD_S)),
         ("accelerometer, m/s2,", &force, within(FORCE_MAX_M_S2)),
@@ -132,7 +132,7 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
         ("position of GNSS, m,", place.as_ref().map_or(&[], |place| place), within(PLACE_MAX_M)),
         ("velocity of GNSS, m/s,", velocity.as_ref().map_or(&[], |velocity| velocity), within(SPEED_MAX_M_S)),
     ];
-    outside(&told, |_| false).or_else(|| outside(&measured, f64::is_nan))
+    outside(&feedback, |_| false).or_else(|| outside(&measured, f64::is_nan))
 }
 
 /// What a value is, the values, and the least and the greatest that it can have.
@@ -152,7 +152,7 @@ fn vector(Vector3 { x, y, z }: Vector3) -> [f64; 3] {
 
 fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<String> {
     let passed_s = now.frame.saturating_sub(before.frame) as f64 * FRAME_S;
-    // An age grows with the time, or begins anew with what is heard.
+    // An age grows with time, or restarts with the next reception.
     let aged = |what: &str, then: Option<f64>, now: Option<f64>| {
         let (then, now) = (then?, now?);
         (now > then + passed_s + ROUNDING_S)
@@ -166,7 +166,7 @@ fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<Stri
         return Some("the booster is attached again, in flight".to_owned());
     }
     if flew && before.struck && !now.struck {
-        return Some("the contact has ended, before the landing motor was lit".to_owned());
+        return Some("the contact has ended before the landing motor was ignited".to_owned());
     }
     let [then, space] = [before.space_bytes, now.space_bytes];
     // A disk that does not answer has none.

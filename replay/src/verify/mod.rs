@@ -1,7 +1,7 @@
 //! Checks whether the controller makes the recorded decisions again, bit for bit.
 //!
 //! [`verify`] builds the flight computer from the mission in the log and runs it on every recorded
-//! input. It compares every field of the output, the digest of the memory, what the pilot thought,
+//! input. It compares every field of the output, the digest of the memory, the estimate,
 //! and the computer at its release with the record. The inputs themselves are judged: some cannot
 //! be. [`verify_strictly`] also draws the world of a simulated flight again, and compares its
 //! measurements and its verdict. The answer lists what was compared and what was not; truth, events
@@ -40,7 +40,7 @@ use protocol::log::v1::LandingVerdict;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give_each, logs_of, say, warn_of_loss};
+use crate::cli::{Answer, give_each, logs_of, print_note, warn_of_loss};
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight};
 use crate::print::counted;
@@ -69,9 +69,9 @@ fn verify_as(path: &Path, strict: bool) -> Result<Vec<VerifyReport>, LogError> {
     let mut log = FlightLog::open(path)?.decoding(&VERIFIED);
     verify_log(&mut log, strict, || {
         // Another tool may have moved the attachments to the end of the file, after the messages.
-        let mut whole = FlightLog::open(path)?;
-        while whole.next_entry()?.is_some() {}
-        Ok(whole.head().clone())
+        let mut log = FlightLog::open(path)?;
+        while log.next_entry()?.is_some() {}
+        Ok(log.head().clone())
     })
 }
 
@@ -276,20 +276,20 @@ impl VerifyReport {
 
     /// Whether every part that follows from the inputs was compared.
     pub fn is_all_compared(&self) -> bool {
-        self.parts.iter().all(Part::is_whole)
+        self.parts.iter().all(Part::is_complete)
     }
 
     fn conclude(&mut self) {
         let different = |part: &&Part| part.different > 0;
         let of_inputs = |part: &Part| part.name == "inputs";
-        let whole = |part: &Part| part.is_whole() || ONLY_STRICTLY.contains(&part.name);
+        let complete = |part: &Part| part.is_complete() || ONLY_STRICTLY.contains(&part.name);
         self.outcome = if self.parts.iter().filter(different).any(|part| !of_inputs(part)) {
             Verification::Diverged
         } else if self.parts.iter().filter(different).any(of_inputs) {
             Verification::Impossible
         } else if self.obstacle.is_some() {
             Verification::NotReplayable
-        } else if self.damage.is_some() || self.cut.is_some() || !self.parts.iter().all(whole) {
+        } else if self.damage.is_some() || self.cut.is_some() || !self.parts.iter().all(complete) {
             Verification::IdenticalReadablePart
         } else {
             Verification::Identical
@@ -450,7 +450,7 @@ impl Args {
             if file.is_dir() { files.extend(logs_of(file)?) } else { files.push(file.clone()) }
         }
         give_each(&files, self.json, |file| {
-            #[expect(clippy::disallowed_methods, reason = "tells the user how fast it was; decides nothing")]
+            #[expect(clippy::disallowed_methods, reason = "reports the speed to the user; decides nothing")]
             let started = Instant::now();
             let found = if self.strict { verify_strictly(file)? } else { verify(file)? };
             let took = started.elapsed();
@@ -468,7 +468,7 @@ fn warn_of_build(report: &VerifyReport) {
     let differences = &report.build.differences;
     if report.outcome == Verification::Diverged && !differences.is_empty() {
         let facts: Vec<&str> = differences.iter().map(|difference| difference.fact.as_str()).collect();
-        say(&format!("note: another build wrote {}; it differs in {}", report.file, facts.join(", ")));
+        print_note(&format!("note: another build wrote {}; it differs in {}", report.file, facts.join(", ")));
     }
 }
 
@@ -476,7 +476,7 @@ fn print_speed(reports: &[VerifyReport], took: Duration) {
     let seconds = took.as_secs_f64();
     let flight_s: f64 = reports.iter().filter_map(|report| report.flight_s).sum();
     if flight_s > 0.0 && seconds > 0.0 {
-        say(&format!(
+        print_note(&format!(
             "{flight_s:.1} s of flight in {seconds:.2} s, {:.0} times real time",
             flight_s / seconds
         ));

@@ -40,7 +40,7 @@ impl Part {
     }
 
     /// All of it was compared, if it can be.
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         !self.follows || self.compared == self.recorded
     }
 }

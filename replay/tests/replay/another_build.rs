@@ -1,11 +1,11 @@
-//! Tests logs that this build would not produce: every command says so, so that nobody blames the
-//! settings for it.
+//! Tests logs that this build would not produce: every command reports it, so that the settings are
+//! not blamed.
 
 use replay::cli::Answer as _;
 use replay::evaluate::evaluate;
 use replay::log::Recording;
 
-use crate::asked::settings;
+use crate::settings::settings;
 use crate::simulated::MK2;
 
 /// The landing, with two commands that this build would not give.

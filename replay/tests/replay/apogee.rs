@@ -11,9 +11,9 @@ use replay::refly::{ReflyOptions, refly, refly_flight, write_log};
 use replay::verify::explain::explain;
 use replay::verify::{Verification, verify};
 
-use crate::asked::{settings, with, with_plant};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
+use crate::settings::{settings, with, with_plant};
 use crate::tampered::Held;
 
 fn recording() -> Recording {
@@ -192,7 +192,7 @@ fn every_plan_solved_again_is_the_flown_one() {
 
 /// The record claims another command; this build, flying on from there, lands as the vehicle did.
 #[test]
-fn a_divergence_report_says_whether_the_verdict_would_change() {
+fn a_divergence_report_states_whether_the_verdict_changes() {
     let recording = recording();
     let path = LANDED.beside("forged.mcap");
     let mut held = Held::read(&LANDED.log);

@@ -12,11 +12,11 @@ use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::signing::Key;
 use replay::verify::book::{AuditFound, audit_logs};
 
-/// What a station wrote, and what it told the vehicle.
+/// Entries of a station's book, and the heads that it reported to the vehicle.
 struct Day {
     entries: Vec<BookEntry>,
     heads: Vec<BookHead>,
-    told: Vec<SignedHead>,
+    reported: Vec<SignedHead>,
     key: BookKey,
 }
 
@@ -31,14 +31,14 @@ fn day(arms: &str, secret: u8) -> Day {
         ("acknowledged", arms, "ARM accepted"),
         (CLOSED, "", "the station ends"),
     ];
-    let (mut entries, mut heads, mut told) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut entries, mut heads, mut reported) = (Vec::new(), Vec::new(), Vec::new());
     for (place, (kind, who, text)) in lines.into_iter().enumerate() {
         entries.push(book.enter(&Line { unix_ns: place as u64, kind, who, text }));
         let signed = key.sign(book.head().expect("an entry"));
         heads.push(signed.record());
-        told.push(signed);
+        reported.push(signed);
     }
-    Day { entries, heads, told, key }
+    Day { entries, heads, reported, key }
 }
 
 fn written(path: &Path, records: impl IntoIterator<Item = Record>) -> PathBuf {
@@ -57,9 +57,9 @@ fn ground_log(path: &Path, day: &Day) -> PathBuf {
     written(path, entries.chain(day.heads.iter().cloned().map(Record::BookHead)))
 }
 
-fn vehicle_log(path: &Path, told: &[SignedHead]) -> PathBuf {
+fn vehicle_log(path: &Path, reported: &[SignedHead]) -> PathBuf {
     let mut encoder = Encoder::new(GROUND);
-    let frames = told.iter().map(|head| {
+    let frames = reported.iter().map(|head| {
         let frame = encoder.encode(&MavMessage::TD_BOOK_HEAD(head.message(VEHICLE)));
         let link = "udpin:0.0.0.0:14550".to_owned();
         let bytes = frame.for_log().expect("a record");
@@ -73,11 +73,11 @@ fn audited(logs: &[&PathBuf]) -> AuditFound {
 }
 
 #[test]
-fn a_whole_book_is_proven_and_printed_as_a_story() {
+fn a_complete_book_is_proven_and_printed_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let day = day("Bob", 1);
     let ground = ground_log(&folder.path().join("g.mcap"), &day);
-    let vehicle = vehicle_log(&folder.path().join("v.mcap"), &day.told[..4]);
+    let vehicle = vehicle_log(&folder.path().join("v.mcap"), &day.reported[..4]);
     let found = audited(&[&ground, &vehicle]);
     let book = &found.books[0];
     assert!(found.is_proven(), "{found:?}");
@@ -92,15 +92,14 @@ fn a_whole_book_is_proven_and_printed_as_a_story() {
 fn an_edited_and_a_forged_book_are_not_proven() {
     let folder = tempfile::tempdir().unwrap();
     let truth = day("Bob", 1);
-    let vehicle = vehicle_log(&folder.path().join("v.mcap"), &truth.told);
+    let vehicle = vehicle_log(&folder.path().join("v.mcap"), &truth.reported);
     let mut edited = day("Bob", 1);
     "Eve".clone_into(&mut edited.entries[2].who);
     let log = ground_log(&folder.path().join("edited.mcap"), &edited);
     let found = audited(&[&log]);
     assert!(!found.is_proven());
     assert!(found.books[0].broken.as_ref().unwrap().contains("from 2 to 2 was changed"), "{found:?}");
-    // Signed anew with another key: its first entry is another one, and the vehicle's book is
-    // missing.
+    // Signed again with another key: its first entry differs, and the vehicle's book is missing.
     let log = ground_log(&folder.path().join("forged.mcap"), &day("Eve", 2));
     let found = audited(&[&log, &vehicle]);
     assert!(!found.is_proven() && found.missing.len() == 1, "{found:?}");

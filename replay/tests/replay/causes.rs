@@ -40,10 +40,18 @@ fn the_computer_of_a_log_is_run_from_its_power_up() {
 #[test]
 fn a_restart_in_the_burn_is_named_and_not_the_motor() {
     for seed in 1..=6 {
-        let found = info(&fly_recipe(&recipe("mk3", seed, "reboot:0.3@powered")).log).unwrap();
+        let flown = fly_recipe(&recipe("mk3", seed, "reboot:0.3@powered"));
+        let found = info(&flown.log).unwrap();
         let words = words(&found);
         assert!(words[0].starts_with("flight computer away for 0.3"), "{seed}: {words:?}");
         assert!(words.iter().all(|words| !words.contains("landing motor")), "{seed}: {words:?}");
+        // Timeline and end state have it, too.
+        let reset = found.phases[0].spans.iter().find(|span| span.phase == "RESET").unwrap();
+        assert!((reset.until_s - reset.from_s - 0.3).abs() < 0.02, "{seed}: {reset:?}");
+        let ending = found.ending.as_ref().unwrap();
+        assert!(ending.ends_with("; after 1 RESET of the flight computer in flight"), "{seed}: {ending}");
+        let page = report(&flown.log).unwrap().html;
+        assert!(page.contains("<path class=\"reset\"") && page.contains(ending), "{seed}");
     }
 }
 

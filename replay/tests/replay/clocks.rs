@@ -1,5 +1,4 @@
-//! Tests the clocks of a log: one time base in the file, and times that are asked for by the name
-//! of their clock.
+//! Tests the clocks of a log: one time base in the file, and times given by the name of their clock.
 
 use std::collections::BTreeMap;
 
@@ -56,7 +55,7 @@ fn frames_truth_and_transforms_have_one_time_base() {
     }
 }
 
-/// The same moment, asked for on each clock that `info` shows.
+/// The same moment, given on each clock that `info` shows.
 #[test]
 fn a_flight_is_flown_again_from_a_time_of_any_clock() {
     let recording = MK2.recording();

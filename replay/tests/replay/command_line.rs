@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::flown::{FLIGHT, FRAME_S, Recipe, WHOLE, write_log};
+use crate::flown::{COMPLETE, FLIGHT, FRAME_S, Recipe, write_log};
 use crate::foreign::foreign_mcap;
 use crate::from_apogee::LANDED;
 
@@ -55,7 +55,7 @@ pub(crate) fn refusal(command: &mut Command) -> String {
 #[test]
 fn a_log_is_identical_also_with_other_functions_of_the_c_library() {
     let files = Files::new();
-    for log in [&files.file(&WHOLE.bytes), &LANDED.log] {
+    for log in [&files.file(&COMPLETE.bytes), &LANDED.log] {
         for tunables in ["", "glibc.cpu.hwcaps=-FMA,-AVX2,-FMA4"] {
             let (code, report) = data(replay("verify", log).env("GLIBC_TUNABLES", tunables));
             assert_eq!((code, &report["outcome"]), (0, &"identical".into()));
@@ -91,8 +91,8 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
 #[test]
 fn a_cut_log_exits_0_with_a_warning() {
     let files = Files::new();
-    let (at, frames) = WHOLE.synced[4];
-    let file = files.file(&WHOLE.bytes[..usize::try_from(at).unwrap() + 5]);
+    let (at, frames) = COMPLETE.synced[4];
+    let file = files.file(&COMPLETE.bytes[..usize::try_from(at).unwrap() + 5]);
     for question in ["verify", "info"] {
         let (code, _, stderr) = run(&mut replay(question, &file));
         assert!(code == 0 && stderr.contains("warning"), "{stderr}");
@@ -108,10 +108,10 @@ fn a_cut_log_exits_0_with_a_warning() {
 
 /// What is lost behind that is for `recover`.
 #[test]
-fn a_log_broken_in_the_middle_says_until_when_it_was_read() {
+fn a_log_broken_in_the_middle_states_until_when_it_was_read() {
     let files = Files::new();
-    let (at, frames) = WHOLE.synced[4];
-    let mut bytes = WHOLE.bytes.clone();
+    let (at, frames) = COMPLETE.synced[4];
+    let mut bytes = COMPLETE.bytes.clone();
     bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
     let (code, info) = data(&mut replay("info", &files.file(&bytes)));
     let until_s = frames as f64 * FRAME_S;

@@ -8,7 +8,7 @@ use replay::info::info;
 use serde_json::Value;
 
 use crate::command_line::{Files, data, refusal, replay, run};
-use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+use crate::flown::{COMPLETE, FLIGHT, Recipe, write_log};
 use crate::from_apogee::{LANDED, fly};
 use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
 use crate::station::station_log;
@@ -40,14 +40,14 @@ fn a_folder_is_a_season() {
     assert!(refusal(replay("info", &MK2.log).arg("--csv")).contains("--csv is for a folder"));
 }
 
-/// What a station heard and a log without its end have their lines.
+/// The log of a station and a log without its end have their lines.
 #[test]
-fn a_season_has_what_a_station_heard_and_says_what_is_damaged() {
+fn a_season_lists_station_logs_and_damaged_logs() {
     let season = tempfile::tempdir().unwrap();
-    std::fs::copy(station_log(&WITH_FRAMES.log, "season.mcap"), season.path().join("heard.mcap")).unwrap();
+    std::fs::copy(station_log(&WITH_FRAMES.log, "season.mcap"), season.path().join("station.mcap")).unwrap();
     let (code, stdout, _) = run(&mut replay("info", season.path()));
-    assert!(code == 0 && stdout.contains("STANDS UNDAMAGED") && stdout.contains("heard.mcap"), "{stdout}");
-    std::fs::write(season.path().join("cut.mcap"), &WHOLE.bytes[..WHOLE.bytes.len() / 2]).unwrap();
+    assert!(code == 0 && stdout.contains("STANDS UNDAMAGED") && stdout.contains("station.mcap"), "{stdout}");
+    std::fs::write(season.path().join("cut.mcap"), &COMPLETE.bytes[..COMPLETE.bytes.len() / 2]).unwrap();
     let (code, stdout, _) = run(&mut replay("info", season.path()));
     let cut = stdout.lines().find(|line| line.ends_with("cut.mcap")).unwrap();
     assert!(code == 0 && cut.contains("no verdict") && cut.contains("without an end mark"), "{stdout}");
@@ -77,7 +77,7 @@ fn a_comparison_opens_with_the_landings() {
 #[test]
 fn several_logs_are_verified_at_once_and_the_worst_decides() {
     let files = Files::new();
-    let good = files.file(&WHOLE.bytes);
+    let good = files.file(&COMPLETE.bytes);
     let mut frames = FLIGHT.frames[..8].to_vec();
     frames[6].output.gimbal_rad[1] = 0.25;
     let bad = files.directory.path().join("bad <&>.mcap");
@@ -97,7 +97,7 @@ fn several_logs_are_verified_at_once_and_the_worst_decides() {
 }
 
 #[test]
-fn a_flight_is_like_itself_and_the_other_ones_signals_say_how_far_they_are_apart() {
+fn a_flight_equals_itself_and_another_one_differs_by_signal() {
     let (code, found) = data(replay("compare", &MK2.log).arg(&MK2.log));
     assert_eq!((code, &found[0]["failures"]), (0, &Value::Array(Vec::new())));
     let (_, found) = data(replay("compare", &MK2.log).arg(&DISPERSED.log));
@@ -108,7 +108,7 @@ fn a_flight_is_like_itself_and_the_other_ones_signals_say_how_far_they_are_apart
 }
 
 #[test]
-fn reports_say_open_or_closed_loop_and_unknown_names_exit_1() {
+fn answers_state_open_or_closed_loop_and_unknown_names_exit_1() {
     let log = &MK2.log;
     for (question, kind) in [("evaluate", "open loop"), ("refly", "closed loop")] {
         let (code, report) = data(replay(question, log).args(["--set", "powered.weights.theta=75"]));
@@ -153,10 +153,10 @@ fn val_judge_finds_no_better_plan_than_the_one_that_flew() {
 }
 
 #[test]
-fn a_recovered_log_is_not_whole() {
+fn a_recovered_log_is_not_complete() {
     let files = Files::new();
-    let (at, frames) = WHOLE.synced[4];
-    let cut = files.file(&WHOLE.bytes[..usize::try_from(at).unwrap() + 5]);
+    let (at, frames) = COMPLETE.synced[4];
+    let cut = files.file(&COMPLETE.bytes[..usize::try_from(at).unwrap() + 5]);
     let output = files.directory.path().join("whole.mcap");
     let (code, recovery) = data(replay("recover", &cut).arg(&output));
     assert_eq!((code, &recovery["ended"]), (0, &false.into()));

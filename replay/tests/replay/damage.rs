@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use protocol::log::computer_v1::ComputerFrame;
 use replay::log::{Entry, FlightLog, LogError};
 
-use crate::flown::{FLIGHT, WHOLE, verify_bytes};
+use crate::flown::{COMPLETE, FLIGHT, verify_bytes};
 
 /// Every frame that can be read, and whether the log is damaged.
 fn read_frames(bytes: &[u8]) -> Result<(Vec<ComputerFrame>, bool), LogError> {
@@ -21,13 +21,13 @@ fn read_frames(bytes: &[u8]) -> Result<(Vec<ComputerFrame>, bool), LogError> {
 
 /// Where the data end and the summary begins.
 fn data_end() -> usize {
-    usize::try_from(WHOLE.synced.last().unwrap().0).unwrap()
+    usize::try_from(COMPLETE.synced.last().unwrap().0).unwrap()
 }
 
 /// Records shorter than their fields, of every known and unknown type, after a good beginning.
 #[test]
 fn a_record_too_short_for_its_type_ends_the_reading() {
-    let beginning = &WHOLE.bytes[..usize::try_from(WHOLE.synced[0].0).unwrap()];
+    let beginning = &COMPLETE.bytes[..usize::try_from(COMPLETE.synced[0].0).unwrap()];
     for opcode in 0..=u8::MAX {
         for length in 0..48_u8 {
             let mut bytes = beginning.to_vec();
@@ -35,7 +35,7 @@ fn a_record_too_short_for_its_type_ends_the_reading() {
             bytes.extend(u64::from(length).to_le_bytes());
             bytes.extend(std::iter::repeat_n(0, usize::from(length)));
             let (frames, damaged) = read_frames(&bytes).unwrap();
-            assert_eq!(frames.len(), WHOLE.synced[0].1, "type {opcode}, {length} bytes");
+            assert_eq!(frames.len(), COMPLETE.synced[0].1, "type {opcode}, {length} bytes");
             // An end-of-data record of four bytes, without a checksum, is valid.
             assert!(damaged || opcode == mcap::records::op::DATA_END, "type {opcode}, {length} bytes");
         }
@@ -49,7 +49,7 @@ proptest! {
     /// damaged and every frame that is read is an original frame.
     #[test]
     fn no_flipped_bit_goes_unnoticed(place in 0..data_end(), bit in 0_u32..8) {
-        let mut bytes = WHOLE.bytes.clone();
+        let mut bytes = COMPLETE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
         if let Ok((frames, damaged)) = read_frames(&bytes) {
             prop_assert!(damaged);
@@ -59,8 +59,8 @@ proptest! {
 
     /// After the data there is only what this reader does not need, under a checksum of its own.
     #[test]
-    fn a_broken_summary_is_told_and_loses_no_frame(place in data_end() + 13..WHOLE.bytes.len(), bit in 0_u32..8) {
-        let mut bytes = WHOLE.bytes.clone();
+    fn a_broken_summary_is_reported_and_loses_no_frame(place in data_end() + 13..COMPLETE.bytes.len(), bit in 0_u32..8) {
+        let mut bytes = COMPLETE.bytes.clone();
         bytes[place] ^= 1_u8 << bit;
         let (frames, damaged) = read_frames(&bytes).unwrap();
         prop_assert_eq!(frames.len(), FLIGHT.frames.len());

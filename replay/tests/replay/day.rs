@@ -85,7 +85,7 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     let (code, stdout, stderr) = learn(&[LANDED.log.to_str().unwrap()]);
     assert!(code != 1, "{stderr}");
     assert!(stdout.ends_with(if code == 0 { "\nGO\n" } else { "\nNO-GO\n" }), "{stdout}");
-    // A careful club's day, and not the kindest, unless it is asked for.
+    // The default prior is `real`, not the most benign one.
     assert!(stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real\n"), "{stdout}");
     let asked = [LANDED.log.to_str().unwrap(), "--prior", "field", "--limit", "0.01"];
     let (code, stdout, stderr) = learn(&asked);

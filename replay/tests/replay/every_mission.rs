@@ -46,12 +46,12 @@ const IDENTICAL: Answer = (0, &["{frames} of {frames} frames identical\n", "!INC
 const UNFLOWN: Answer =
     (0, &["{frames} of {frames} frames identical of an INCOMPLETE flight: ends on the pad", "!DIVERGED"]);
 const TABLES: Answer = (0, &["computer_frame.", ": {frames} rows of "]);
-const HEARD_ONLY: Answer = (5, &["nothing was compared: it has no frames of a flight computer"]);
-const WHOLE: Answer = (0, &["the log was whole: nothing is lost", "!warning"]);
+const RECEIVED_ONLY: Answer = (5, &["nothing was compared: it has no frames of a flight computer"]);
+const COMPLETE: Answer = (0, &["the log was whole: nothing is lost", "!warning"]);
 
 const REPLAY: &str = env!("CARGO_BIN_EXE_replay");
 
-/// Rows are asked in this order: some read what a row before them wrote.
+/// Rows run in this order: some read a file that an earlier row wrote.
 const TABLE: [Row; 16] = [
     row(
         "info {log}",
@@ -117,21 +117,21 @@ const TABLE: [Row; 16] = [
     ),
     row("export {log} --to csv --out {dir}/csv", TABLES, TABLES, TABLES),
     row(
-        "info {dir}/told.mcap",
+        "info {dir}/station.mcap",
         (0, &["verdict     STANDS UNDAMAGED"]),
         (0, &["verdict     ABORTED"]),
         (0, &["verdict     NOT FLOWN: the log ends in PAD_IDLE"]),
     ),
-    row("verify {dir}/told.mcap", HEARD_ONLY, HEARD_ONLY, HEARD_ONLY),
+    row("verify {dir}/station.mcap", RECEIVED_ONLY, RECEIVED_ONLY, RECEIVED_ONLY),
     row(
         "fit {log}",
         (0, &["{mission} with ", "thrust_scale", "gimbal_delay"]),
         (0, &["{mission} with ", "drag_per_mass_scale"]),
         (1, &["has no frames of a flight computer"]),
     ),
-    row("recover {log} {dir}/whole.mcap", WHOLE, WHOLE, WHOLE),
+    row("recover {log} {dir}/whole.mcap", COMPLETE, COMPLETE, COMPLETE),
     row("verify {dir}/whole.mcap", IDENTICAL, IDENTICAL, UNFLOWN),
-    row("recover {log} {dir}/whole.mcap", WHOLE, WHOLE, WHOLE),
+    row("recover {log} {dir}/whole.mcap", COMPLETE, COMPLETE, COMPLETE),
 ];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -179,12 +179,12 @@ impl Case {
         });
         let frames = info(&flown.log).unwrap().frames.unwrap().last;
         let name = format!("{mission} from {} with {fault:?}", start.name());
-        station_log(&flown.log, "told.mcap");
+        station_log(&flown.log, "station.mcap");
         Self { mission, name, ends, flown, frames, planned }
     }
 
     /// What is wrong in the answer to a row.
-    fn ask(&self, row: &Row) -> Vec<String> {
+    fn check(&self, row: &Row) -> Vec<String> {
         let names: BTreeMap<&str, String> = BTreeMap::from([
             ("{log}", self.flown.log.display().to_string()),
             ("{dir}", self.flown.log.parent().unwrap().display().to_string()),
@@ -258,7 +258,7 @@ fn every_command_answers_about_every_mission() {
     let faults = [("abort@3", Ends::Aborted), ("lidar-out@3", Ends::Landed)];
     cases.extend(faults.map(|(fault, ends)| Case::fly("mk3", StartPoint::Apogee, Some(fault), ends)));
     assert_eq!(cases.len(), 16, "7 from apogee, 2 from the pad, 5 below a drone, 2 with a fault");
-    let wrong = side_by_side(&cases, |case| TABLE.iter().flat_map(|row| case.ask(row)).collect());
+    let wrong = side_by_side(&cases, |case| TABLE.iter().flat_map(|row| case.check(row)).collect());
     assert!(wrong.is_empty(), "{} answers are wrong:\n{}", wrong.len(), wrong.join("\n\n"));
 }
 
@@ -279,7 +279,7 @@ const DO_NOT_ACT: [(&str, f64, &str); 12] = [
     (
         "powered.landing_miss",
         1e-9,
-        "every plan that converges ends in its box; the level is told and steers nothing",
+        "every plan that converges ends in its box; the level is reported and steers nothing",
     ),
     ("powered.latest_after_s", 0.1, "no plan ends so late"),
     ("powered.solver.max_iterations", 2.0, "no solve needs as many"),
@@ -312,7 +312,7 @@ fn changed(prefix: &str, value: &toml::Value, factor: f64) -> Vec<Setting> {
 
 /// A setting that nothing reads would be accepted, and change nothing without a word.
 #[test]
-fn a_setting_of_the_landing_acts_or_the_answer_says_that_it_did_not() {
+fn a_setting_of_the_landing_acts_or_is_reported_as_inactive() {
     let recipe = Recipe::built_in("mk3", "real").unwrap().starting_at(StartPoint::Pad).unwrap();
     let mission = toml::Table::try_from(&recipe.mission).unwrap();
     let flown = simulate_recipe(recipe, &[]);
@@ -346,8 +346,8 @@ fn a_setting_of_the_landing_acts_or_the_answer_says_that_it_did_not() {
                         || recorded.fins_rad != evaluated.fins_rad
                         || recorded.phase != evaluated.phase
                 });
-                let told = format!("no command differs: {} ", report.settings.join(" "));
-                assert_eq!(said.contains(&told), !acts, "{said}");
+                let inactive = format!("no command differs: {} ", report.settings.join(" "));
+                assert_eq!(said.contains(&inactive), !acts, "{said}");
                 Some(acts)
             };
             let found = [acts(more), acts(less)];

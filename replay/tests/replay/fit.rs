@@ -1,4 +1,4 @@
-//! What a flight's log tells of its vehicle, through the command and the library.
+//! Tests fits of flight logs, through the command and the library.
 
 use std::io::Cursor;
 use std::process::Command;
@@ -15,12 +15,12 @@ use crate::command_line::run;
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 
-fn asked(arguments: &[&str]) -> (i32, String, String) {
+fn run_fit(arguments: &[&str]) -> (i32, String, String) {
     run(Command::new(env!("CARGO_BIN_EXE_replay")).arg("fit").args(arguments))
 }
 
 fn fits(arguments: &[&str]) -> (Vec<Fit>, serde_json::Value) {
-    let (code, stdout, stderr) = asked(&[arguments, ["--json"].as_slice()].concat());
+    let (code, stdout, stderr) = run_fit(&[arguments, ["--json"].as_slice()].concat());
     assert_eq!(code, 0, "{stderr}");
     let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap();
     (serde_json::from_value(answer["fits"].clone()).unwrap(), answer)
@@ -33,8 +33,8 @@ fn close(fit: &Fit, name: &str, truth: f64, bar: f64) {
 }
 
 #[test]
-fn val_simulation_a_field_flight_is_known_within_the_bars() {
-    // In the same flight of seed 2 the gimbal is asked too little for its play to be seen.
+fn val_simulation_a_field_flight_is_fitted_within_its_intervals() {
+    // In the flight of seed 2 the gimbal moves too little for its play to be seen.
     let recipe = Recipe { seed: 3, ..Recipe::built_in("mk2", "field").unwrap() };
     let truth = draw(&recipe.mission, &recipe.dispersion, 3, 3).truth;
     let flown = crate::from_apogee::fly_recipe(&recipe);
@@ -61,11 +61,11 @@ fn val_simulation_a_field_flight_is_known_within_the_bars() {
     assert!(fit.not_found.iter().any(|lack| lack.name == "mass"), "{:?}", fit.not_found);
 }
 
-/// What is wrong is told as that, with the reason, and the rest is found: a motor that was fired
+/// A broken part is reported with the reason, and the rest is found: a motor that was fired
 /// and gives no thrust; a servo that stays at 3.7 degrees, whatever is commanded; a motor that goes
 /// out after two seconds.
 #[test]
-fn what_is_broken_is_told_with_its_reason_and_the_rest_is_found() {
+fn a_broken_part_is_reported_with_its_reason_and_the_rest_is_found() {
     let (dark, not_its_model, not_its_curve) = (
         "no thrust was seen after the igniter was fired",
         "the gimbal is not its model: with any delay, rate and play its feedback stays ",
@@ -98,20 +98,19 @@ fn no_delay_lies_on_the_grid_of_the_frames() {
 }
 
 #[test]
-fn intervals_say_on_how_many_flights_they_were_calibrated() {
-    let own = fit(&TRACE);
-    let calibration = own.calibration.as_ref().unwrap();
-    assert!(calibration.own && calibration.vehicles == ["mk2"] && calibration.flights >= 100, "{own:?}");
-    assert!(own.sentences()[1].starts_with("95 % intervals, calibrated on "), "{own:?}");
-    assert!(own.get("thrust_scale").unwrap().systematic.is_some());
-    // The same flight of a vehicle that nobody has flown: the widest of the others', and it says
-    // so.
+fn intervals_state_on_how_many_flights_they_were_calibrated() {
+    let flown = fit(&TRACE);
+    let calibration = flown.calibration.as_ref().unwrap();
+    assert!(calibration.own && calibration.vehicles == ["mk2"] && calibration.flights >= 100, "{flown:?}");
+    assert!(flown.sentences()[1].starts_with("95 % intervals, calibrated on "), "{flown:?}");
+    assert!(flown.get("thrust_scale").unwrap().systematic.is_some());
+    // The same flight of a vehicle without calibration: the widest of the others', and it is stated.
     let mission = flight::vehicle::mission::Mission { name: "ours".to_owned(), ..TRACE.mission.clone() };
     let ours = fit(&Trace { mission, ..TRACE.clone() });
     assert!(!ours.calibration.as_ref().unwrap().own);
     for name in ["thrust_scale", "drag_per_mass_scale", "wind_x"] {
-        let [own, other] = [&own, &ours].map(|fit| fit.get(name).unwrap().sigma);
-        assert!(other >= own, "{name}: {other} {own}");
+        let [narrow, wide] = [&flown, &ours].map(|fit| fit.get(name).unwrap().sigma);
+        assert!(wide >= narrow, "{name}: {wide} {narrow}");
     }
 }
 
@@ -151,7 +150,7 @@ fn what_was_found_goes_into_the_missions_file() {
     assert!((after / before - 1.0).abs() < 1e-3, "{before} {after}");
     // Another vehicle's file stays as it is.
     std::fs::write(&path, heavier.replace("name = \"mk2\"", "name = \"other\"")).unwrap();
-    let (code, _, stderr) = asked(&[[log].as_slice(), &write].concat());
+    let (code, _, stderr) = run_fit(&[[log].as_slice(), &write].concat());
     assert!(code == 1 && stderr.contains("is the mission of other, and the log is of mk2"), "{stderr}");
 }
 
@@ -162,7 +161,7 @@ fn several_logs_are_put_together_and_a_bad_one_does_not_hide_the_others() {
     let together = answer["together"].as_array().unwrap();
     let delay = together.iter().find(|one| one["mean"]["name"] == "gimbal_delay").unwrap();
     assert_eq!((found.len(), &delay["flights"]), (2, &2.into()));
-    let (code, stdout, stderr) = asked(&[landed, "none.mcap"]);
+    let (code, stdout, stderr) = run_fit(&[landed, "none.mcap"]);
     assert!(code == 5 && stdout.contains("thrust_scale") && stderr.contains("none.mcap: cannot"), "{stderr}");
 }
 
@@ -173,7 +172,7 @@ fn flights_of_different_missions_are_not_put_together() {
     let files = [LANDED.log.to_str().unwrap(), other.log.to_str().unwrap()];
     let (found, answer) = fits(&files);
     assert!(found.len() == 2 && answer["together"].as_array().unwrap().is_empty(), "{answer}");
-    let (_, stdout, _) = asked(&files);
+    let (_, stdout, _) = run_fit(&files);
     assert!(stdout.ends_with("not put together: these are flights of mk2 and mk3\n"), "{stdout}");
 }
 
@@ -194,7 +193,7 @@ fn a_stands_table_needs_its_motor() {
         (&[LANDED.log.to_str().unwrap(), "--motor", "H45W"], "--motor H45W: only a table of a test stand"),
         (&[table, "--motor", "G99"], "is neither a built-in motor"),
     ] {
-        let (code, _, stderr) = asked(arguments);
+        let (code, _, stderr) = run_fit(arguments);
         assert!(code == 1 && stderr.contains(words), "{stderr}");
     }
 }

@@ -29,8 +29,8 @@ pub(crate) struct Flight {
     pub(crate) start: ComputerStart,
     pub(crate) frames: Vec<ComputerFrame>,
     pub(crate) verdict: v1::LandingVerdict,
-    /// What the pilot thought after each frame.
-    thoughts: Vec<Record>,
+    /// The estimate after each frame.
+    estimates: Vec<Record>,
     header: LogHeader,
 }
 
@@ -39,12 +39,12 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
     let recipe = FlightRecipe::built_in(MISSION, "field").unwrap();
     let mut flight = Sortie::new(&recipe, NUMBER).unwrap();
     let start = record::start(flight.computer());
-    let (mut frames, mut thoughts, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
+    let (mut frames, mut estimates, mut last) = (Vec::new(), Vec::new(), LastFrame::default());
     while frames.len() < FRAMES {
         flight.step_with(&Outside::NOBODY, &mut last);
         frames.push(*last.take().unwrap());
         let beside = record::estimate_and_truth(&flight).into_iter();
-        thoughts.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
+        estimates.extend(beside.filter(|record| matches!(record, Record::Estimate(_))));
     }
     let limit = |name: &str| v1::LimitResult {
         name: name.to_owned(),
@@ -61,7 +61,7 @@ pub(crate) static FLIGHT: LazyLock<Flight> = LazyLock::new(|| {
         table_2: vec![limit("distance")],
         ..v1::LandingVerdict::default()
     };
-    Flight { start, frames, verdict, thoughts, header: campaign_header(&recipe, NUMBER) }
+    Flight { start, frames, verdict, estimates, header: campaign_header(&recipe, NUMBER) }
 });
 
 /// The mission of the flight.
@@ -107,8 +107,8 @@ pub(crate) fn write_log(frames: &[ComputerFrame], recipe: &Recipe) -> Written {
         }
         writer.write(&Record::ComputerFrame(Box::new(frame.clone())), time_ns).unwrap();
         let place = usize::try_from(frame.input.frame).ok().and_then(|number| number.checked_sub(1));
-        if let Some(thought) = place.and_then(|place| FLIGHT.thoughts.get(place)) {
-            writer.write(thought, time_ns).unwrap();
+        if let Some(estimate) = place.and_then(|place| FLIGHT.estimates.get(place)) {
+            writer.write(estimate, time_ns).unwrap();
         }
         if index % 5 == 4 {
             writer.flush().unwrap();
@@ -148,7 +148,8 @@ fn around(frame: &ComputerFrame) -> [Record; 3] {
 }
 
 /// A log of the whole flight.
-pub(crate) static WHOLE: LazyLock<Written> = LazyLock::new(|| write_log(&FLIGHT.frames, &Recipe::default()));
+pub(crate) static COMPLETE: LazyLock<Written> =
+    LazyLock::new(|| write_log(&FLIGHT.frames, &Recipe::default()));
 
 /// The report on a log's only flight.
 pub(crate) fn only(mut reports: Vec<VerifyReport>) -> VerifyReport {

@@ -150,16 +150,16 @@ impl Flown {
     /// Records a frame as the run loop does.
     fn record(&mut self, vehicle: &Vehicle, events: &[VehicleEvent]) {
         let time_ns = (1e9 * vehicle.time_s()) as u64;
-        let mut keep = |record| self.records.push((record, time_ns));
-        vehicle.computer_records().into_iter().for_each(&mut keep);
+        let mut record_at = |record| self.records.push((record, time_ns));
+        vehicle.computer_records().into_iter().for_each(&mut record_at);
         for event in events {
             match event {
                 VehicleEvent::Verdict => {
-                    keep(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
+                    record_at(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
                 VehicleEvent::PhaseChanged { to, .. } => self.phases.push(*to),
                 VehicleEvent::Text { severity, text } if *severity >= Severity::Warning => {
-                    keep(Record::Event(Event {
+                    record_at(Record::Event(Event {
                         level: EventLevel::Warning,
                         name: "vehicle".to_owned(),
                         message: text.clone(),
@@ -168,7 +168,7 @@ impl Flown {
                 _ => {}
             }
         }
-        vehicle.records().into_iter().for_each(&mut keep);
+        vehicle.records().into_iter().for_each(&mut record_at);
     }
 
     fn written(&self, records: impl Iterator<Item = (Record, u64)>) -> PathBuf {
@@ -298,7 +298,7 @@ fn if_frames_on_the_pad_are_lost_the_pilot_is_still_verified_from_its_release() 
         let flown = Flown::from(start, &armed_and_started(2_600), &[]);
         // Left out by the writer's sequence number, as if a chunk were damaged.
         let mut held = Held::read(&flown.log());
-        held.keep(|message| !message.is_frame() || !(500..510).contains(&message.sequence));
+        held.retain(|message| !message.is_frame() || !(500..510).contains(&message.sequence));
         let path = flown.folder.path().join("gap.mcap");
         held.write(&path);
         let report = verify(&path).unwrap().remove(0);

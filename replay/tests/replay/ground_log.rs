@@ -1,5 +1,4 @@
-//! Tests the log of a ground station, which has what was heard and nothing that the vehicle
-//! recorded.
+//! Tests the log of a ground station, which has received messages and no records of the vehicle.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,31 +14,34 @@ use crate::station::{EARLIER_NS, station_log};
 
 static GROUND: LazyLock<PathBuf> = LazyLock::new(|| station_log(&WITH_FRAMES.log, "ground.mcap"));
 
-/// The verdict that was heard is the vehicle's own, to the precision of a message.
+/// The received verdict is that of the vehicle, to the precision of a message.
 #[test]
-fn a_ground_log_has_the_verdict_that_was_heard() {
-    let (heard, own) = (info(&GROUND).unwrap(), info(&WITH_FRAMES.log).unwrap());
-    let (verdict, recorded) = (heard.verdict.unwrap(), own.verdict.unwrap());
+fn a_ground_log_has_the_received_verdict() {
+    let (received, flown) = (info(&GROUND).unwrap(), info(&WITH_FRAMES.log).unwrap());
+    let (verdict, recorded) = (received.verdict.unwrap(), flown.verdict.unwrap());
     assert_eq!((verdict.landing, verdict.clock), (recorded.landing, Clock::Boot));
-    let boot = own.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
+    let boot = flown.clocks.convert(recorded.contact(), Clock::Boot).unwrap();
     assert!((verdict.time_s - boot.time_s).abs() < 0.001, "{} {boot}", verdict.time_s);
     let limits = verdict.envelope.iter().zip(&recorded.envelope);
-    for (heard, own) in limits {
-        assert_eq!((&heard.name, &heard.unit, heard.passed), (&own.name, &own.unit, own.passed));
-        assert!((heard.value - own.value).abs() < 1e-4, "{heard:?} {own:?}");
-        assert!((heard.maximum - own.maximum).abs() < 1e-4, "{heard:?} {own:?}");
+    for (received, recorded) in limits {
+        assert_eq!(
+            (&received.name, &received.unit, received.passed),
+            (&recorded.name, &recorded.unit, recorded.passed)
+        );
+        assert!((received.value - recorded.value).abs() < 1e-4, "{received:?} {recorded:?}");
+        assert!((received.maximum - recorded.maximum).abs() < 1e-4, "{received:?} {recorded:?}");
     }
-    assert!(heard.phases.iter().any(|phases| phases.spans.len() > 3));
-    assert_eq!(heard.grade.level, GradeLevel::TelemetryOnly);
+    assert!(received.phases.iter().any(|phases| phases.spans.len() > 3));
+    assert_eq!(received.grade.level, GradeLevel::TelemetryOnly);
     assert_eq!(verify(&GROUND).unwrap()[0].outcome, Verification::NotReplayable);
 }
 
 #[test]
-fn the_report_of_a_ground_log_marks_the_touchdown_on_its_own_clock() {
+fn the_report_of_a_ground_log_marks_the_touchdown_on_the_clock_of_the_log() {
     let recording = Recording::open(&GROUND).unwrap();
     let contact_s = recording.contact_s().unwrap();
-    let own = info(&WITH_FRAMES.log).unwrap();
-    let own_s = own.clocks.convert(own.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
+    let flown = info(&WITH_FRAMES.log).unwrap();
+    let own_s = flown.clocks.convert(flown.verdict.unwrap().contact(), Clock::Boot).unwrap().time_s;
     assert!((contact_s - own_s - EARLIER_NS as f64 / 1e9).abs() < 0.2, "{contact_s} {own_s}");
     let page = replay::report::report(&GROUND).unwrap().html;
     assert!(page.contains("STANDS UNDAMAGED") && page.contains(">touchdown</text>"));
@@ -78,7 +80,7 @@ fn every_message_becomes_a_table_with_every_field() {
     assert_eq!(frames, raw);
 }
 
-/// What the crew read as T+ is the T+ of the log, also before the landing motor is lit.
+/// What the crew read as T+ is the T+ of the log, also before the landing motor is ignited.
 #[test]
 fn the_crews_clock_is_the_clock_of_the_log() {
     let clocks = info(&WITH_FRAMES.log).unwrap().clocks;
@@ -95,7 +97,7 @@ fn the_crews_clock_is_the_clock_of_the_log() {
         let since_s = clocks.convert(boot, Clock::Flight).unwrap().time_s;
         // The clock that the crew reads stands still after touchdown.
         if 0.1 < since_s && since_s < 5.0 {
-            assert!((since_s + countdown_ms / 1e3).abs() < 0.02, "{since_s} s, told {countdown_ms} ms");
+            assert!((since_s + countdown_ms / 1e3).abs() < 0.02, "{since_s} s, reported {countdown_ms} ms");
             flown += 1;
         }
     }

@@ -1,4 +1,5 @@
-//! Tests logs whose messages are not in order of time, which MCAP allows: they are refused.
+//! Tests logs whose messages are not in order of time, which MCAP allows: they are refused, and
+//! recovered.
 
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use crate::command_line::{replay, run};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
-use crate::tampered::{Held, Kept};
+use crate::tampered::{Held, LogMessage};
 
 /// The orders that other programs write: one topic after the other, from either end; a later part
 /// first; and equal times from the last topic to the first.
@@ -37,7 +38,7 @@ fn assert_refused_as_unordered(log: &Path, directory: &Path) {
     for question in questions {
         let (code, stdout, stderr) = run(replay(question[0], log).args(&question[1..]));
         assert_eq!((code, stdout.as_str()), (1, ""), "{question:?}: {stderr}");
-        let words = ["is not in order of time", "`mcap sort` sorts it"];
+        let words = ["is not in order of time", "`replay recover` puts it in order"];
         assert!(words.iter().all(|words| stderr.contains(words)), "{question:?}: {stderr}");
     }
 }
@@ -63,7 +64,7 @@ fn a_frame_that_is_a_little_late_is_out_of_order() {
     let log = directory.path().join("log.mcap");
     let mut held = Held::read(&LANDED.log);
     let before = held.messages.len() - 40;
-    let late = before + held.messages[before..].iter().position(Kept::is_frame).unwrap();
+    let late = before + held.messages[before..].iter().position(LogMessage::is_frame).unwrap();
     held.messages[late..late + 12].rotate_left(1);
     held.write(&log);
     assert_refused_as_unordered(&log, directory.path());
@@ -82,4 +83,37 @@ fn records_that_come_a_little_late_are_no_other_order() {
     assert_eq!(only(verify(&log).unwrap()).outcome, Verification::Identical);
     let recovery = recover(&log, &directory.path().join("again.mcap")).unwrap();
     assert_eq!(recovery.fault(), None);
+}
+
+/// Sorted by time where the numbers of the frames agree with it.
+#[test]
+fn a_log_in_another_order_is_recovered_in_order() {
+    let directory = tempfile::tempdir().unwrap();
+    let (log, again) = (directory.path().join("log.mcap"), directory.path().join("again.mcap"));
+    let held = Held::read(&MK2.log);
+    for (number, other) in in_other_orders(&held).iter().enumerate() {
+        other.write(&log);
+        let recovery = recover(&log, &again.with_file_name(format!("{number}.mcap"))).unwrap();
+        assert!(recovery.fault().unwrap().contains("sorted by time"), "{number}: {recovery:?}");
+        assert_eq!(Held::read(&recovery.output).facts(), held.facts(), "{number}");
+        assert_eq!(only(verify(&recovery.output).unwrap()).first_divergence, None, "{number}");
+    }
+}
+
+/// A recorder whose clock is set back in flight: sorted by time, the frames of two stretches would
+/// be mixed.
+#[test]
+fn the_order_of_the_frames_holds_where_a_clock_was_set_back() {
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("log.mcap");
+    let mut held = Held::read(&MK2.log);
+    let (half, frames) = (held.messages.len() / 2, held.frames() as u64);
+    for message in &mut held.messages[half..] {
+        message.log_time_ns -= 2_000_000_000;
+    }
+    held.write(&log);
+    let recovery = recover(&log, &directory.path().join("again.mcap")).unwrap();
+    assert!(recovery.fault().unwrap().contains("whose order is kept"), "{recovery:?}");
+    let report = only(verify(&recovery.output).unwrap());
+    assert!(report.first_divergence.is_none() && report.frames_identical == frames, "{report:?}");
 }

@@ -13,7 +13,7 @@ use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::simulated::{MK2, WITH_FRAMES};
 use crate::station::{station_log, station_log_with};
-use crate::tampered::{Held, Kept};
+use crate::tampered::{Held, LogMessage};
 
 /// Answers of `info`, `verify --strict`, `compare` with itself and `recover`: whether each takes
 /// the log for complete.
@@ -97,8 +97,8 @@ fn every_command_agrees_about_one_counter_for_all_channels() {
     held.write(&log);
     assert_eq!(complete(&log), [true; 4]);
     // A frame is missing.
-    let lost = held.messages.iter().rposition(Kept::is_frame).unwrap() - 200;
-    let lost = lost + held.messages[lost..].iter().position(Kept::is_frame).unwrap();
+    let lost = held.messages.iter().rposition(LogMessage::is_frame).unwrap() - 200;
+    let lost = lost + held.messages[lost..].iter().position(LogMessage::is_frame).unwrap();
     held.messages.remove(lost);
     held.write(&log);
     let found = info(&log).unwrap();
@@ -158,7 +158,7 @@ fn frames_of_the_pad_before_a_release_are_of_the_same_flight() {
     let recording = MK2.recording();
     let whole = info(&MK2.log).unwrap();
     let held = Held::read(&MK2.log);
-    let is_start = |message: &Kept| message.topic == "/computer/start";
+    let is_start = |message: &LogMessage| message.topic == "/computer/start";
     let release = held.messages.iter().rposition(is_start).unwrap();
     assert!(recording.release_frame > 10);
     for before in [1, 3] {

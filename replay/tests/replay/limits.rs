@@ -15,7 +15,7 @@ use replay::refly::{ReflyOptions, refly};
 use replay::report::report;
 use replay::verify::explain::explain;
 
-use crate::flown::{FLIGHT, FRAME_NS, Recipe, WHOLE, write_log};
+use crate::flown::{COMPLETE, FLIGHT, FRAME_NS, Recipe, write_log};
 
 /// Runs the command with limited memory; returns the result and the output.
 fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
@@ -36,8 +36,8 @@ fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
 fn a_hollow_log_is_used_up_to_its_hole() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("hollow.mcap");
-    let (at, frames) = WHOLE.synced[4];
-    std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap()]).unwrap();
+    let (at, frames) = COMPLETE.synced[4];
+    std::fs::write(&path, &COMPLETE.bytes[..usize::try_from(at).unwrap()]).unwrap();
     let file = std::fs::File::options().write(true).open(&path).unwrap();
     file.set_len(10 << 30).unwrap();
     for (arguments, expected) in [
@@ -67,7 +67,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
 fn a_chunk_that_unpacks_to_gigabytes_does_not_fill_the_memory() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("bomb.mcap");
-    let (at, _) = WHOLE.synced[4];
+    let (at, _) = COMPLETE.synced[4];
     for unpacked in [48_u64 << 20, 4 << 30] {
         // Zeros, packed by lz4 into sequences of 255 bytes each.
         let file = std::io::Cursor::new(Vec::new());
@@ -84,7 +84,7 @@ fn a_chunk_that_unpacks_to_gigabytes_does_not_fill_the_memory() {
         let begins = usize::try_from(chunk.chunk_start_offset).unwrap();
         let mut chunk = bomb[begins..begins + usize::try_from(chunk.chunk_length).unwrap()].to_vec();
         chunk[9 + 16..][..8].copy_from_slice(&unpacked.to_le_bytes());
-        std::fs::write(&path, [&WHOLE.bytes[..usize::try_from(at).unwrap()], &chunk].concat()).unwrap();
+        std::fs::write(&path, [&COMPLETE.bytes[..usize::try_from(at).unwrap()], &chunk].concat()).unwrap();
         for arguments in [&["info"][..], &["verify"], &["evaluate"]] {
             let (code, said) = within(260, arguments, &path);
             assert!(code <= 2, "{arguments:?}: {said}");
@@ -107,8 +107,8 @@ fn text(text: &str) -> Vec<u8> {
 
 /// The whole log up to its end mark, and an end without a checksum over all data.
 fn data_and_ending() -> (Vec<u8>, Vec<u8>) {
-    let at = usize::try_from(WHOLE.synced.last().unwrap().0).unwrap();
-    (WHOLE.bytes[..at].to_vec(), protocol::log::writer::ending())
+    let at = usize::try_from(COMPLETE.synced.last().unwrap().0).unwrap();
+    (COMPLETE.bytes[..at].to_vec(), protocol::log::writer::ending())
 }
 
 /// An attachment of a gigabyte that is nearly all a hole is passed over, and so is a chunk; what
@@ -122,7 +122,7 @@ fn what_is_too_large_is_passed_over_by_its_length() {
     let frames = FLIGHT.frames.len();
     for opcode in [mcap::records::op::ATTACHMENT, mcap::records::op::CHUNK] {
         let first = usize::try_from(
-            mcap::Summary::read(&WHOLE.bytes).unwrap().unwrap().chunk_indexes[0].chunk_start_offset,
+            mcap::Summary::read(&COMPLETE.bytes).unwrap().unwrap().chunk_indexes[0].chunk_start_offset,
         )
         .unwrap();
         let head = [&[opcode][..], &LENGTH.to_le_bytes()].concat();

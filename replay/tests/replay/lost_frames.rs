@@ -37,7 +37,7 @@ fn around_the_loss(recording: &Recording) -> (u64, u64) {
 }
 
 #[test]
-fn an_evaluation_ends_at_the_loss_and_says_so() {
+fn an_evaluation_ends_at_the_loss_and_states_it() {
     let recording = Recording::open(&RECOVERED).unwrap();
     let (after, before) = around_the_loss(&recording);
     let evaluated = evaluate(&recording, &[]).unwrap();
@@ -68,7 +68,7 @@ fn a_flight_is_flown_again_across_the_loss() {
 }
 
 #[test]
-fn the_report_says_up_to_which_frame_the_log_can_be_run_again() {
+fn the_report_states_up_to_which_frame_the_log_can_be_run_again() {
     let (after, _) = around_the_loss(&Recording::open(&RECOVERED).unwrap());
     let page = report(&RECOVERED).unwrap().html;
     assert!(page.contains(&format!("bit-exact: up to frame {after} of")), "grade");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_TRUTH_SAMPLE};
 
 use crate::command_line::{data, replay, run};
-use crate::flown::WHOLE;
+use crate::flown::COMPLETE;
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
 use crate::tampered::Held;
@@ -15,11 +15,11 @@ use crate::tampered::Held;
 fn thinned(log: &Path, directory: &tempfile::TempDir) -> PathBuf {
     let mut held = Held::read(log);
     let (mut frames, mut truths, mut all_frames) = (0, 0, 0);
-    held.keep(|message| {
+    held.retain(|message| {
         all_frames += usize::from(message.topic == TOPIC_COMPUTER_FRAME);
         true
     });
-    held.keep(|message| match message.topic.as_str() {
+    held.retain(|message| match message.topic.as_str() {
         TOPIC_COMPUTER_FRAME => {
             frames += 1;
             // The last one says that the flight is over.
@@ -67,7 +67,7 @@ fn a_flight_that_lost_half_its_frames_is_not_the_same() {
 fn a_lost_topic_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
     let mut held = Held::read(&MK2.log);
-    held.keep(|message| message.topic != TOPIC_TRUTH_SAMPLE);
+    held.retain(|message| message.topic != TOPIC_TRUTH_SAMPLE);
     let path = directory.path().join("no-truth.mcap");
     held.write(&path);
     for (a, b, word) in [(&MK2.log, &path, "missing"), (&path, &MK2.log, "added")] {
@@ -81,9 +81,9 @@ fn a_lost_topic_does_not_pass() {
 #[test]
 fn a_damaged_log_does_not_pass() {
     let directory = tempfile::tempdir().unwrap();
-    let (at, _) = WHOLE.synced[6];
+    let (at, _) = COMPLETE.synced[6];
     let path = directory.path().join("cut.mcap");
-    std::fs::write(&path, &WHOLE.bytes[..usize::try_from(at).unwrap() + 5]).unwrap();
+    std::fs::write(&path, &COMPLETE.bytes[..usize::try_from(at).unwrap() + 5]).unwrap();
     let (code, found) = data(replay("compare", &path).arg(&path));
     assert!(code == 3 && found[0]["failures"][0].as_str().unwrap().contains("is damaged"), "{found}");
 }

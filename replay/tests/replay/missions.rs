@@ -6,7 +6,7 @@ use crate::command_line::{replay, run};
 use crate::flown::{FLIGHT, Recipe, mission_toml, write_log};
 
 #[test]
-fn info_and_report_say_which_keys_are_not_those_of_the_standard_controller() {
+fn info_and_report_list_keys_that_differ_from_the_standard_controller() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("flight.mcap");
     let standard = mission_toml();

@@ -12,7 +12,7 @@ use replay::info::{GradeLevel, Info, info, info_of};
 use replay::log::{FlightLog, Gap, Recording};
 use replay::verify::{Obstacle, Verification, verify};
 
-use crate::flown::{FLIGHT, MISSION, Recipe, WHOLE, only, verify_bytes, verify_frames, write_log};
+use crate::flown::{COMPLETE, FLIGHT, MISSION, Recipe, only, verify_bytes, verify_frames, write_log};
 use crate::tampered::Held;
 
 fn info_of_bytes(bytes: &[u8]) -> Info {
@@ -40,7 +40,7 @@ fn lossy(frames: &[ComputerFrame], kept: impl Fn(u64) -> bool) -> (tempfile::Tem
     let path = directory.path().join("lossy.mcap");
     std::fs::write(&path, write_log(frames, &Recipe::default()).bytes).unwrap();
     let mut held = Held::read(&path);
-    held.keep(|message| {
+    held.retain(|message| {
         !message.is_frame() || kept(ComputerFrame::decode(message.data.as_slice()).unwrap().input.frame)
     });
     held.write(&path);
@@ -88,9 +88,9 @@ fn an_input_of_another_version_is_refused() {
 fn a_log_without_its_start_or_with_a_frame_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("flight.mcap");
-    std::fs::write(&path, &WHOLE.bytes).unwrap();
+    std::fs::write(&path, &COMPLETE.bytes).unwrap();
     let mut held = Held::read(&path);
-    held.keep(|message| message.topic != TOPIC_COMPUTER_START);
+    held.retain(|message| message.topic != TOPIC_COMPUTER_START);
     held.write(&path);
     assert_eq!(only(verify(&path).unwrap()).obstacle, Some(Obstacle::NoStart));
     assert_eq!(info(&path).unwrap().grade.level, GradeLevel::Numeric);
@@ -131,8 +131,8 @@ fn a_frame_of_a_newer_version_is_refused() {
 }
 
 #[test]
-fn the_whole_flight_is_described() {
-    let info = info_of_bytes(&WHOLE.bytes);
+fn the_complete_flight_is_described() {
+    let info = info_of_bytes(&COMPLETE.bytes);
     assert_eq!(info.grade.level, GradeLevel::BitExact);
     assert!(info.completeness.complete);
     assert_eq!(info.run.get("seed").map(String::as_str), Some("1"));

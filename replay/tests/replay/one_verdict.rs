@@ -12,7 +12,7 @@ use crate::from_apogee::{LANDED, fly};
 use crate::simulated::MK2;
 
 /// The sentence of `info`, after checking that text and page say it, too.
-fn said_alike(log: &std::path::Path) -> String {
+fn same_ending(log: &std::path::Path) -> String {
     let info = info(log).unwrap();
     let ending = info.ending.clone().unwrap();
     let row = format!("verdict     {ending}");
@@ -22,7 +22,7 @@ fn said_alike(log: &std::path::Path) -> String {
 }
 
 #[test]
-fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
+fn both_verdicts_are_shown_with_broken_limits_only() {
     for log in [&LANDED.log, &MK2.log] {
         let info = info(log).unwrap();
         let verdict = info.verdict.as_ref().unwrap();
@@ -32,7 +32,7 @@ fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
         assert_eq!(names(&verdict.envelope), of_legs);
         assert_eq!(names(&verdict.table_2), [&["distance", "height"], &of_legs[..]].concat());
         assert_eq!(names(&verdict.borne), ["stroke used", "leg load"]);
-        let ending = said_alike(log);
+        let ending = same_ending(log);
         let Landing { stands, envelope, table_2, .. } = verdict.landing;
         let words = ["STANDS UNDAMAGED", "inside the design envelope of its legs", "inside Table 2"];
         assert_eq!(words.map(|word| ending.contains(word)), [stands, envelope, table_2], "{ending}");
@@ -48,9 +48,9 @@ fn both_verdicts_are_known_and_only_broken_limits_are_shown() {
 
 #[test]
 fn an_abort_and_a_parachute_are_called_that() {
-    let ending = said_alike(&fly(&["abort@3"]).log);
+    let ending = same_ending(&fly(&["abort@3"]).log);
     assert_eq!(ending, "ABORTED, then DOWN UNDER THE PARACHUTE, not landed");
-    let ending = said_alike(&fly(&["no-light@0"]).log);
+    let ending = same_ending(&fly(&["no-light@0"]).log);
     assert!(ending.starts_with("DOWN UNDER THE PARACHUTE") || ending.starts_with("NOT LANDED: "), "{ending}");
 }
 
@@ -64,5 +64,5 @@ fn a_refused_start_is_called_that() {
     let (name, message) = ("vehicle".to_owned(), "REFUSED: pin: in, must be out".to_owned());
     log.write(&Record::Event(Event { level: EventLevel::Info, name, message }), 0).unwrap();
     log.finish().unwrap();
-    assert_eq!(said_alike(&path), "REFUSED: pin: in, must be out");
+    assert_eq!(same_ending(&path), "REFUSED: pin: in, must be out");
 }

@@ -72,7 +72,7 @@ fn a_fault_that_cannot_be_is_refused_with_what_could() {
 /// What broke is the first finding, in the description as text and as JSON; a landing with nothing
 /// broken has none.
 #[test]
-fn a_description_says_what_went_wrong_first_in_time() {
+fn a_description_lists_findings_in_order_of_time() {
     for (fault, words) in [
         ("gnss-out@3", "GNSS lost for "),
         ("gimbal-jams:4@powered", "gimbal pitch 10.8 deg from where its commands take it, at 3.7 deg"),
@@ -116,7 +116,7 @@ fn a_wait_that_ends_on_the_pad_has_findings() {
     );
 }
 
-/// What a flight that was armed anew had on its pad comes before what went wrong in the air.
+/// Findings on the pad of a flight that was armed twice come before those in the air.
 #[test]
 fn findings_begin_on_the_pad() {
     let mut crew = crate::from_power_up::armed_and_started(1_200);

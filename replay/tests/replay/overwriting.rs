@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::command_line::{Files, refusal, replay, run};
-use crate::flown::WHOLE;
+use crate::flown::COMPLETE;
 use crate::simulated::{MK2, WITH_FRAMES};
 
 const OTHERS: &[u8] = b"somebody else's bytes";
@@ -39,7 +39,7 @@ fn copied(log: &Path) -> (tempfile::TempDir, PathBuf) {
 
 /// A file that is there is kept, also the log that is read, under any of its names.
 #[test]
-fn what_exists_is_kept_and_the_next_free_name_is_said() {
+fn an_existing_file_is_preserved_and_the_next_free_name_is_reported() {
     for (arguments, name) in writers() {
         let (directory, log) = copied(&WITH_FRAMES.log);
         let at = |name: &str| directory.path().join(name);
@@ -71,7 +71,7 @@ fn what_exists_is_kept_and_the_next_free_name_is_said() {
 }
 
 #[test]
-fn tables_get_a_folder_of_their_own() {
+fn tables_get_a_new_folder() {
     let (directory, log) = copied(&WITH_FRAMES.log);
     let at = |name: &str| directory.path().join(name);
     std::fs::create_dir_all(at("tables")).unwrap();
@@ -116,7 +116,7 @@ fn a_report_twice_is_two_pages() {
 fn a_command_that_fails_replaces_nothing() {
     let files = Files::new();
     // Cut before its first record.
-    let broken = files.file(&WHOLE.bytes[..8]);
+    let broken = files.file(&COMPLETE.bytes[..8]);
     let output = files.directory.path().join("output");
     std::fs::write(&output, OTHERS).unwrap();
     for (arguments, _) in writers() {

@@ -8,7 +8,7 @@ use replay::log::Recording;
 use replay::report::report;
 use sim::recipe::{Recipe as Flown, toml_starting_at};
 
-use crate::flown::{FLIGHT, Recipe, WHOLE, write_log};
+use crate::flown::{COMPLETE, FLIGHT, Recipe, write_log};
 use crate::from_apogee::{LANDED, fly, fly_recipe};
 use crate::simulated::{DISPERSED, MK2, WITH_FRAMES};
 use crate::station::station_log;
@@ -41,7 +41,7 @@ fn section<'a>(page: &'a str, title: &str) -> &'a str {
     below.split("<h2").next().unwrap()
 }
 
-fn says_in_order(page: &str, words: &[&str]) {
+fn has_in_order(page: &str, words: &[&str]) {
     let places: Vec<usize> =
         words.iter().map(|words| page.find(words).unwrap_or_else(|| panic!("{words}"))).collect();
     assert!(places.is_sorted(), "{places:?}");
@@ -56,7 +56,7 @@ fn script_data(page: &str) -> serde_json::Value {
 
 /// The flight computer is run again to get its plans.
 #[test]
-fn the_report_says_the_verdict_first_and_then_why() {
+fn the_report_states_the_verdict_first_and_then_why() {
     let mk3 = fly_recipe(&Flown::built_in("mk3", "none").unwrap());
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log, &mk3.log] {
         let page = page_of(log);
@@ -71,7 +71,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
             iterations.</p>|Newton iterations, of each plan|Battery voltage, V|\
             Mission against the built-in one</h2>|Events</h2>|\
             every checksum holds|The log has nothing of: Link.";
-        says_in_order(&page, &order.split('|').collect::<Vec<_>>());
+        has_in_order(&page, &order.split('|').collect::<Vec<_>>());
         assert!(page.len() <= 400_000, "{} bytes", page.len());
         assert!(!page.contains("start_unix_ns"));
         // A part of the time moves what stands beside a line.
@@ -104,7 +104,7 @@ fn the_report_says_the_verdict_first_and_then_why() {
 
 /// What flew, when and where stand at the top, and every phase above the height.
 #[test]
-fn the_first_screen_says_when_and_where_and_names_every_phase() {
+fn the_first_screen_states_time_and_position_and_names_every_phase() {
     let page = page_of(&WITH_FRAMES.log);
     let log = replay::info::info(&WITH_FRAMES.log).unwrap();
     let head = page.split_once("<header><p>").unwrap().1.split_once("</p>").unwrap().0;
@@ -124,7 +124,7 @@ fn the_first_screen_says_when_and_where_and_names_every_phase() {
 /// Logs with frames only, a cut log, a log without a flight, one of a ground station, and names
 /// that contain markup.
 #[test]
-fn a_poor_log_has_a_page_that_says_what_is_missing() {
+fn the_page_of_an_incomplete_log_lists_what_is_missing() {
     let directory = tempfile::tempdir().unwrap();
     let nothing = || Recipe { with_frames: false, ..Recipe::default() };
     let no_profile = Recipe { with_frames: false, profile_toml: None };
@@ -137,7 +137,7 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
         ("own.mcap", &write_log(&FLIGHT.frames, &nothing()).bytes, &["estimate; the log has no truth"]),
         (
             "cut <b>&.mcap",
-            &WHOLE.bytes[..WHOLE.bytes.len() / 2],
+            &COMPLETE.bytes[..COMPLETE.bytes.len() / 2],
             &["without an end mark", "cut &lt;b&gt;&amp;.mcap"],
         ),
         ("empty.mcap", &write_log(&[], &nothing()).bytes, &["has no positions of the vehicle"]),
@@ -149,12 +149,12 @@ fn a_poor_log_has_a_page_that_says_what_is_missing() {
         assert!(words.iter().all(|words| page.contains(words)), "{name}: {page}");
     }
     let log = station_log(&WITH_FRAMES.log, "page.mcap");
-    says_in_order(&page_of(&log), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
+    has_in_order(&page_of(&log), &["STANDS UNDAMAGED", "From the telemetry of a ground station"]);
 }
 
-/// A motor that never lit has no thrust in words, legends and grounds.
+/// A motor that never ignited has no thrust in words, legends and reasons.
 #[test]
-fn the_report_of_a_motor_that_never_lit_says_nothing_of_thrust() {
+fn the_report_of_a_motor_that_never_ignited_has_no_thrust() {
     let page = page_of(&fly(&["no-light@0"]).log);
     assert!(page.contains("landing motor did not light") && page.contains(">Flight</h2>"));
     for words in [">burn</span>", ">Burn</h2>", "<b>Thrust, N", "class=\"hot\""] {
@@ -172,7 +172,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
     let page = page_of(&fly_recipe(&recipe).log);
     let moments = ["lift-off", "burn-out", "separation", "apogee", "ignition", "contact"];
     let cells = moments.map(|moment| format!("<td>{moment}</td>"));
-    says_in_order(&page, &cells.each_ref().map(String::as_str));
+    has_in_order(&page, &cells.each_ref().map(String::as_str));
     for stage in ["ascent", "fall", "burn"] {
         assert!(page.matches(&format!("\">{stage}</span>")).count() >= 2, "{stage}");
     }
@@ -199,7 +199,7 @@ fn errors_of_the_estimate_are_drawn_in_every_direction_and_only_in_the_air() {
 fn the_report_of_a_broken_flight_names_its_cause_first() {
     let page = page_of(&fly(&["gimbal-jams:4@powered"]).log);
     let cause = "gimbal pitch 10.8 deg from where its commands take it, at 3.7 deg";
-    says_in_order(
+    has_in_order(
         &page,
         &[
             &format!("First sign: {cause}, at T+"),

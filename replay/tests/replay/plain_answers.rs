@@ -16,7 +16,7 @@ fn flights_with_nothing_in_common_are_not_alike() {
         .unwrap();
     let (code, found) = data(replay("compare", &MK2.log).arg(&nothing));
     assert_eq!((code, found[0]["signals"].as_array().unwrap().len()), (3, 0));
-    assert!(found[0]["verdicts"][0]["landing"]["stands"] == true, "the verdict is still told: {found}");
+    assert!(found[0]["verdicts"][0]["landing"]["stands"] == true, "the verdict is still reported: {found}");
 }
 
 /// What a file is matters more than what is missing of the command.

@@ -6,10 +6,10 @@ use replay::log::{Moment, Recording};
 use replay::refly::{ReflyOptions, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
-use crate::asked::{settings, with};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::lost_frames::RECOVERED;
+use crate::settings::{settings, with};
 
 /// Flies again, writes the log, and verifies it with this build.
 fn written(name: &str, recording: &Recording, options: &ReflyOptions) -> Recording {
@@ -23,7 +23,7 @@ fn written(name: &str, recording: &Recording, options: &ReflyOptions) -> Recordi
 }
 
 /// The frame numbers; none may be left out.
-fn assert_whole(again: &Recording) {
+fn assert_complete(again: &Recording) {
     assert!(again.frames.iter().map(|frame| frame.input.frame).eq(1..=again.frames.len() as u64));
 }
 
@@ -37,7 +37,7 @@ fn a_reflown_log_holds_only_frames_of_this_build() {
     forged.frames[99].output.gimbal_rad[1] += 0.1;
     forged.start.as_mut().unwrap().believed.position_m.x += 0.1;
     let again = written("of_another_build.mcap", &forged, &ReflyOptions::default());
-    assert_whole(&again);
+    assert_complete(&again);
     assert_eq!((again.start, again.frames), (whole.start, whole.frames));
 }
 
@@ -52,7 +52,7 @@ fn a_log_reflown_from_a_recovered_log_has_no_gap() {
         &recovered,
         &ReflyOptions { start: Some(Moment::Frame(last)), ..with(&[]) },
     );
-    assert_whole(&again);
+    assert_complete(&again);
     assert_eq!(again.frames, Recording::open(&LANDED.log).unwrap().frames);
 }
 

@@ -1,4 +1,4 @@
-//! Writes the log of a ground station that hears every frame of a vehicle.
+//! Writes the log of a ground station that receives every frame of a vehicle.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

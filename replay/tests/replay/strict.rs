@@ -33,11 +33,11 @@ fn pad() -> Held {
     PAD[0].clone()
 }
 
-fn on_disk<T>(held: &Held, ask: impl FnOnce(&Path) -> T) -> T {
+fn on_disk<T>(held: &Held, check: impl FnOnce(&Path) -> T) -> T {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("flight.mcap");
     held.write(&path);
-    ask(&path)
+    check(&path)
 }
 
 fn strictly(held: &Held) -> VerifyReport {
@@ -77,7 +77,7 @@ fn a_sensor_that_dies_is_no_impossible_input() {
 }
 
 #[test]
-fn what_a_sensor_remembers_of_the_pad_is_not_recorded_and_that_is_said() {
+fn sensor_state_from_the_pad_is_not_recorded_and_that_is_reported() {
     let flown = Flown::from(StartPoint::Pad, &armed_and_started(2_600), &["gnss-stuck@pad"]);
     let report = only(verify_strictly(&flown.log()).unwrap());
     assert_eq!((report.outcome, report.is_all_compared()), (Verification::Identical, false), "{report:?}");
@@ -97,7 +97,7 @@ fn with_frames(mut change: impl FnMut(u64, &mut ComputerFrame)) -> Held {
 }
 
 #[test]
-fn a_whole_flight_passes_and_says_what_was_compared() {
+fn a_complete_flight_passes_and_lists_what_was_compared() {
     let report = strictly(&pad());
     assert!(passes(&report), "{report:?}");
     for (name, least) in
@@ -109,7 +109,7 @@ fn a_whole_flight_passes_and_says_what_was_compared() {
     assert_eq!(report.part("verdict").map(|part| part.compared), Some(1));
     let truth = report.part("truth").unwrap();
     assert!(truth.compared == 0 && truth.recorded > 0 && !truth.follows, "{truth:?}");
-    // Without --strict nobody has looked at the verdict, and the answer says so.
+    // Without --strict the verdict is not compared, and the answer states it.
     let report = loosely(&pad());
     assert_eq!((report.outcome, report.is_all_compared()), (Verification::Identical, false));
 }
@@ -132,7 +132,7 @@ fn another_version_of_the_contents_is_no_excuse() {
 /// Its frames begin at the release, so what the computer remembers of its pad is unknown, and
 /// nothing differs.
 #[test]
-fn a_flight_without_its_pad_is_no_divergence_and_is_not_whole() {
+fn a_flight_without_its_pad_is_incomplete_and_no_divergence() {
     let mut held = pad();
     let released = |data: &[u8]| {
         protocol::log::computer_v1::ComputerStart::decode(data).is_ok_and(|start| start.released)
@@ -229,7 +229,7 @@ fn frames_missing_behind_the_contact_are_missed() {
             .unwrap()
             .0;
         let mut place = 0;
-        held.keep(|message| {
+        held.retain(|message| {
             place += 1;
             place <= last || !(message.is_frame() || message.topic == TOPIC_ESTIMATE)
         });
@@ -241,7 +241,7 @@ fn frames_missing_behind_the_contact_are_missed() {
 
 /// The vehicle gives out such a log: its end says nothing about how much there was.
 #[test]
-fn without_a_summary_the_answer_says_what_cannot_be_known() {
+fn without_a_summary_the_answer_states_what_is_unknown() {
     on_disk(&PAD[1], |path| {
         let whole = std::fs::read(path).unwrap();
         let chunks = mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes;
@@ -380,8 +380,8 @@ fn messages_in(held: &Held) -> Vec<(&str, u64, &[u8])> {
     messages
 }
 
-/// Every checksum of these logs is right, so that only what they hold tells that they are not
-/// whole: strictly none passes, and a recovery keeps what is there and nothing else.
+/// Every checksum of these logs is right, so that only their contents show that they are incomplete:
+/// strictly none passes, and a recovery recovers exactly the remaining messages.
 fn tamper_in_ways(cases: u32) {
     let mut runner = TestRunner::new(ProptestConfig { cases, ..ProptestConfig::default() });
     let harms = vec![
@@ -420,12 +420,12 @@ fn tamper_in_ways(cases: u32) {
 }
 
 #[test]
-fn strict_passes_only_the_whole() {
+fn strict_passes_only_complete_logs() {
     tamper_in_ways(32);
 }
 
 #[test]
 #[ignore = "takes ten minutes: a thousand ways instead of 32"]
-fn strict_passes_only_the_whole_in_a_thousand_ways() {
+fn strict_passes_only_complete_logs_in_a_thousand_ways() {
     tamper_in_ways(1_000);
 }

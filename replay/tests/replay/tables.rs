@@ -40,7 +40,7 @@ fn a_flight_equals_itself_in_every_signal() {
 }
 
 #[test]
-fn a_known_difference_has_its_rms_its_maximum_and_its_time() {
+fn a_constructed_difference_has_its_rms_its_maximum_and_its_time() {
     let a = flown(&MK2);
     let mut b = a.clone();
     let name = "vehicle_truth3d.state.position_m.x";

@@ -11,7 +11,7 @@ use protocol::log::record::TOPIC_COMPUTER_FRAME;
 
 /// A message of a log, by its topic.
 #[derive(Debug, Clone)]
-pub(crate) struct Kept {
+pub(crate) struct LogMessage {
     pub(crate) topic: String,
     pub(crate) log_time_ns: u64,
     pub(crate) sequence: u32,
@@ -20,7 +20,7 @@ pub(crate) struct Kept {
     schema: (String, std::sync::Arc<[u8]>),
 }
 
-impl Kept {
+impl LogMessage {
     /// The same at another time.
     pub(crate) fn at(&self, log_time_ns: u64) -> Self {
         Self { log_time_ns, ..self.clone() }
@@ -37,7 +37,7 @@ impl Kept {
 pub(crate) struct Held {
     library: String,
     about: Vec<LogItem>,
-    pub(crate) messages: Vec<Kept>,
+    pub(crate) messages: Vec<LogMessage>,
 }
 
 impl Held {
@@ -50,7 +50,7 @@ impl Held {
                 LogItem::Library(library) => held.library = library,
                 LogItem::Message { channel_id, log_time_ns, sequence, data } => {
                     let channel = reader.channel(channel_id).unwrap();
-                    held.messages.push(Kept {
+                    held.messages.push(LogMessage {
                         topic: channel.topic.clone(),
                         log_time_ns,
                         sequence,
@@ -68,7 +68,7 @@ impl Held {
 
     /// Time, topic, number and bytes of each message, in an order that the file's does not change.
     pub(crate) fn facts(&self) -> Vec<(u64, String, u32, Vec<u8>)> {
-        let facts = |message: &Kept| {
+        let facts = |message: &LogMessage| {
             (message.log_time_ns, message.topic.clone(), message.sequence, message.data.clone())
         };
         let mut facts: Vec<_> = self.messages.iter().map(facts).collect();
@@ -82,7 +82,7 @@ impl Held {
     }
 
     /// Leaves out the messages that are not wanted.
-    pub(crate) fn keep(&mut self, wanted: impl FnMut(&Kept) -> bool) {
+    pub(crate) fn retain(&mut self, wanted: impl FnMut(&LogMessage) -> bool) {
         self.messages.retain(wanted);
     }
 

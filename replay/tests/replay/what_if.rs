@@ -3,7 +3,7 @@
 use replay::refly::{ReflyOptions, ReflyReport, margin, other_flights, refly};
 use replay::settings::Setting;
 
-use crate::asked::with;
+use crate::settings::with;
 use crate::simulated::MK2;
 
 #[test]
@@ -39,7 +39,7 @@ fn failed_flights_have_an_order() {
 }
 
 #[test]
-fn a_setting_that_never_acts_is_told() {
+fn a_setting_that_never_acts_is_reported() {
     let recording = MK2.recording();
     for (text, never) in [("ignition.delay_s=0.5@50000", true), ("ignition.delay_s=0.5", false)] {
         let report = refly(&recording, &with(&[text])).unwrap();
@@ -51,7 +51,7 @@ fn a_setting_that_never_acts_is_told() {
 
 /// Each flight is flown with the change and without: without a change none is saved or lost.
 #[test]
-fn other_flights_say_what_a_change_does() {
+fn other_flights_show_the_effect_of_a_change() {
     let recording = MK2.recording();
     let same = other_flights(&recording, &ReflyOptions::default(), 8).unwrap();
     assert_eq!((same.flights, same.saved, same.lost, same.stood), (8, 0, 0, same.stand));

@@ -127,7 +127,7 @@ static VALUES: [&str; 7] =
 const FOLLOWS_DEG: f64 = 5.7;
 
 /// What the vehicle tells of the gate of its ignition with the limits that it tells, and how many
-/// of them hold. It checks more itself.
+/// of them are met. It checks more itself.
 fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Vec<Line<'static>>)> {
     let vehicle = &model.vehicle;
     let descent = vehicle.descent()?;
@@ -152,7 +152,7 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
             whole(height_m),
             format!("in {}..{} m", whole(low_m), whole(high_m)),
         ),
-        ("lands off", off_m <= fence_m, whole(off_m), format!("of {} m", whole(fence_m))),
+        ("off the pad", off_m <= fence_m, whole(off_m), format!("of {} m", whole(fence_m))),
         ("sinks", sinks_m_s > 0.0, whole(sinks_m_s), "m/s".to_owned()),
         ("fins follow", fins == 4, fins.to_string(), "of 4".to_owned()),
         ("parachute", stowed, chute, String::new()),
@@ -160,7 +160,7 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
     ];
     let open = rows.iter().filter(|(_, holds, ..)| *holds).count();
     let role = |holds: bool| if holds { TextRole::Good } else { TextRole::Caution };
-    let title = theme.line(format!(" {open} of {} hold ", rows.len()), role(open == rows.len()));
+    let title = theme.line(format!(" {open} of {} met ", rows.len()), role(open == rows.len()));
     let lines = rows.into_iter().map(|(name, holds, text, unit)| {
         let label = format!("{:<5}{name}", if holds { "ok" } else { "wait" });
         let role = if age == TextRole::Stale { age } else { role(holds) };

@@ -21,7 +21,7 @@ pub fn alarms_lines(
 ) -> Vec<Line<'static>> {
     let list = model.alarms.list();
     if list.is_empty() {
-        return vec![theme.line(" no active or unacknowledged alarm", TextRole::Good)];
+        return vec![theme.line(" no active or unacknowledged alarm", TextRole::Plain)];
     }
     let chosen = model
         .pointed_at()

@@ -42,10 +42,12 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             draw_checklist(model, theme, now, frame, right);
         } else if is_amiss {
             let lines = checks(model, theme, now);
-            let wanted = (lines.len() as u16 + 2).min(right.height);
+            let wanted = lines.len() as u16 + 2;
+            // One row of events would cut the newest one.
+            let wanted = if right.height < wanted + 4 { right.height } else { wanted };
             let [upper, below] = rows(right, [Length(wanted), Fill(1)]);
             table("checks", &lines, theme, frame, upper);
-            if below.height > 2 {
+            if !below.is_empty() {
                 events(model, theme, frame, below);
             }
         } else {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use protocol::dialect::TdPhase;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
@@ -22,7 +23,13 @@ const FINDINGS_TITLE: &str = "what went wrong";
 /// the place.
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
-    let (words, role) = ended.unwrap_or(("no verdict received yet".to_owned(), TextRole::Caution));
+    let settles = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_TOUCHDOWN);
+    let (words, role) = ended.unwrap_or_else(|| match settles {
+        true => {
+            ("at the ground; the vehicle judges its landing once it is at rest".to_owned(), TextRole::Plain)
+        }
+        false => ("no verdict received yet".to_owned(), TextRole::Caution),
+    });
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let report = Act::Report.works(model, now);
     let report = report.then(|| theme.label(format!("  {} writes the report", Act::Report.key_name())));
@@ -72,6 +79,9 @@ fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let Some(count) = findings.count else {
         return vec![theme.line(" not told yet", TextRole::Label)];
     };
+    if count == 0 && model.vehicle.verdict().is_none() {
+        return vec![theme.line(" none reported so far", TextRole::Label)];
+    }
     if count == 0 {
         return vec![theme.line(" nothing went wrong", TextRole::Label)];
     }

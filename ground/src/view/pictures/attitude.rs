@@ -3,7 +3,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdChute;
+use protocol::dialect::{TdChute, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Color;
@@ -11,7 +11,7 @@ use ratatui::text::Line;
 use ratatui::widgets::canvas::{self, Context};
 
 use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme};
-use crate::model::{Attitude, Gimbal, Model, NorthEastUp, is_burning};
+use crate::model::{Attitude, Change, GRAVITY_M_S2, Gimbal, Model, NorthEastUp, Vehicle};
 use crate::view::{draw_line, fixed, pages::framed};
 
 /// From where the vehicle is seen.
@@ -105,7 +105,7 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     let stroke = |context: &mut Context, from: [f64; 3], to: [f64; 3], color: Color| {
         line(context, seen(from), seen(to), color);
     };
-    let burning = vehicle.phase_now().is_some_and(is_burning);
+    let burning = gives_thrust(vehicle);
     let gimbal = vehicle.gimbal().map_or_else(Gimbal::default, |gimbal| gimbal.value);
     let limit_rad =
         vehicle.limits().map(|limits| f64::from(limits.tilt_rad)).filter(|limit| *limit < ARC_REACH);
@@ -172,6 +172,24 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     if vehicle.best_motion().is_some_and(|motion| motion.value.speed_m_s() > 1.0) {
         plane.write(frame, (0.72 * half[0], 0.42), "v", theme.ground().fg(theme.ink(Ink::Measured)));
     }
+}
+
+/// Least specific force of a motor, m/s2: a vehicle that falls freely or is braked by the air in the
+/// last metres has less.
+const THRUST_MIN_M_S2: f64 = 4.0;
+
+/// Whether a motor gives thrust, by what the vehicle has measured: the phases after an ignition that
+/// was only commanded, and the acceleration as soon as it is known.
+fn gives_thrust(vehicle: &Vehicle) -> bool {
+    let phase = match vehicle.phase_now() {
+        Some(TdPhase::TD_PHASE_BOOST) => vehicle.has_lifted,
+        phase => phase == Some(TdPhase::TD_PHASE_POWERED),
+    };
+    let is_measured = |change: Change| {
+        let [north, east, up] = change.acceleration_m_s2;
+        libm::hypot(libm::hypot(north, east), up + GRAVITY_M_S2) > THRUST_MIN_M_S2
+    };
+    phase && vehicle.trend.mean_change().is_none_or(is_measured)
 }
 
 fn line(context: &mut Context, (x1, y1): (f64, f64), (x2, y2): (f64, f64), color: Color) {

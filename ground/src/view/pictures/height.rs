@@ -8,7 +8,12 @@ use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Line;
 
 use super::{Ink, TextRole, Theme, scales, seconds_since, ticks};
-use crate::model::{Model, dead_reckoning::course, is_burning, quantity::Quantity};
+use crate::model::{
+    Model,
+    dead_reckoning::{foreseen, predict_position},
+    is_burning,
+    quantity::Quantity,
+};
 use crate::view::fixed;
 use crate::view::footer::{LENGTHS_S, flight_began, shown_until};
 
@@ -36,8 +41,8 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let until = shown_until(model, now);
     let flown = flown(model, from, until);
     let present_s = seconds_since(until, from);
-    let course = course(vehicle, now).into_iter();
-    let to_come: Vec<(f64, f64)> = course.map(|(ahead_s, [.., up_m])| (present_s + ahead_s, up_m)).collect();
+    let foreseen = foreseen(vehicle, now).into_iter();
+    let to_come: Vec<(f64, f64)> = foreseen.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
     let known = |height: Option<f64>| height.filter(|height_m| height_m.is_finite() && *height_m > 0.0);
     let of = |pick| known(vehicle.of_descent(pick).map(|sample| sample.value));
     let falls = matches!(
@@ -48,14 +53,23 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let apogee_m = of(|d| d.apogee_m);
     let band = of(|d| d.band_low_m).zip(of(|d| d.band_high_m)).filter(|_| lights);
     let commit_m = of(|d| d.commit_height_m).filter(|_| falls);
+    let lit = model.history.timeline.iter().find(|(phase, _)| *phase == TdPhase::TD_PHASE_POWERED);
+    let lit_s = lit.map(|(_, at)| seconds_since(*at, from));
+    // The burn fills the picture: what was flown before it tells nothing about its end.
+    let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
+    let begins_s =
+        lit_s.filter(|_| burns).map_or(if burns { present_s } else { 0.0 }, |lit_s| lit_s.min(present_s));
+    let begins_s = if burns { (begins_s - 1.0).floor().max(0.0) } else { 0.0 };
+    let flown: Vec<(f64, f64)> = flown.into_iter().filter(|(at, _)| *at >= begins_s).collect();
     let reached = flown.iter().chain(&to_come).map(|(_, height_m)| *height_m).fold(TOP_MIN_M, f64::max);
     let top =
         [apogee_m, commit_m, band.map(|band| band.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
     let last_s = to_come.last().map_or(present_s, |(at, _)| *at).max(flown.last().map_or(0.0, |(at, _)| *at));
     // Of a flight that is over as long as it was.
     let length_s = LENGTHS_S.into_iter().find(|most_s| until == now && last_s < *most_s).unwrap_or(last_s);
-    let bounds = ([0.0, length_s], [-0.02 * top, top]);
-    let across = ticks([0.0, length_s], area.width / TICK_COLUMNS);
+    let length_s = if burns { last_s.ceil().max(begins_s + 4.0) } else { length_s };
+    let bounds = ([begins_s, length_s], [-0.02 * top, top]);
+    let across = ticks([begins_s, length_s], area.width / TICK_COLUMNS);
     let plane =
         scales(bounds, (&across, &ticks([0.0, top], area.height / TICK_ROWS)), "T+ s", theme, frame, area);
     let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
@@ -84,12 +98,12 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     let (label, predicted) = (theme.style(TextRole::Label), ink(Ink::Predicted));
-    let lit = model.history.timeline.iter().find(|(phase, _)| is_burning(*phase));
-    let lit_s = lit.map(|(_, at)| seconds_since(*at, from));
     let lit_at = lit_s.and_then(|lit_s| flown.iter().copied().find(|(at, _)| *at >= lit_s));
     let lands_at = to_come.last().filter(|(_, height_m)| *height_m < 1.0).map(|(at, _)| (*at, 0.0));
     let here = height_m.map(|height_m| (present_s, height_m.value.max(0.0)));
+    let lost_at = predict_position(vehicle, now).map(|at| (present_s, at.altitude_m));
     let marks = [
+        (lost_at, "+", predicted),
         (lit_at, "▲", ink(Ink::Flame)),
         (lands_at, "×", predicted),
         (lights_at, "▲", predicted),

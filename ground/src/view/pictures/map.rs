@@ -8,7 +8,7 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Circle;
 
-use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme, circle};
+use super::{DOTS_ACROSS, Ink, Plane, TextRole, Theme, circle};
 use crate::model::{
     Model, Spot, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity,
 };
@@ -53,6 +53,25 @@ pub fn comes_down(model: &Model, now: Duration) -> Option<Spot> {
     Some(Spot { north_m, east_m, error_m })
 }
 
+/// Fall speed from which the impact of a fall without the landing motor is drawn, m/s.
+const FALL_MIN_M_S: f64 = 5.0;
+
+/// Impact position, east and north of the pad, m, of a vehicle that falls on without its landing
+/// motor at its present velocity.
+fn impact_without_motor(model: &Model, now: Duration) -> Option<(f64, f64)> {
+    use TdPhase as P;
+    let vehicle = &model.vehicle;
+    let falls = matches!(
+        vehicle.phase_now()?,
+        P::TD_PHASE_AERO_DESCENT | P::TD_PHASE_LAND_ARMED | P::TD_PHASE_IGNITION
+    );
+    let motion = vehicle.best_motion().filter(|motion| falls && !motion.is_stale(now))?.value;
+    let height_m = vehicle.height_m()?.value;
+    let falls_s = height_m / -motion.climb_m_s;
+    (motion.climb_m_s < -FALL_MIN_M_S)
+        .then(|| (motion.y_m + motion.vy_m_s * falls_s, motion.x_m + motion.vx_m_s * falls_s))
+}
+
 /// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands
 /// still while the vehicle moves over it.
 fn box_around(points: &[(f64, f64)], least_m: f64) -> ((f64, f64), f64) {
@@ -86,6 +105,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
     let lost = predict_position(vehicle, now);
+    let impact = impact_without_motor(model, now).filter(|_| down.is_some());
     let fence_m = vehicle.fence_m();
     let phase = vehicle.phase_now();
     let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
@@ -100,7 +120,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
     let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
     points.extend(lost.iter().flat_map(|at| around((at.y_m, at.x_m), at.error_m.min(500.0))));
-    points.extend(down.iter().map(|at| (at.east_m, at.north_m)));
+    points.extend(down.iter().map(|at| (at.east_m, at.north_m)).chain(impact));
     if !burns || points.is_empty() {
         points.push((0.0, 0.0));
     }
@@ -149,6 +169,10 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let beside = |x: f64| x + 2.0 * DOTS_ACROSS * per_dot;
     let strong = theme.style(TextRole::Title);
     plane.write(frame, (0.0, 0.0), "+", strong);
+    if let Some(at) = impact {
+        plane.write(frame, at, "x", ink(Ink::Limit));
+        plane.beside(frame, at, &["if no light".to_owned(), "no light".to_owned()], ink(Ink::Limit));
+    }
     if let Some(at) = down {
         plane.write(frame, (at.east_m, at.north_m), "×", ink(Ink::Predicted));
     }
@@ -195,14 +219,20 @@ fn words(
     let length_m = widgets::tick_step((right - left) / 5.0, 1);
     let cells = (length_m / column).round().max(2.0) as usize;
     let scale = format!("├{}┤ {} m", "─".repeat(cells.saturating_sub(2)), shortest(length_m));
+    let fence = fence_m.map(|fence_m| (fence_m, format!("fence {} m", shortest(fence_m))));
+    let limit = theme.ground().fg(theme.ink(Ink::Limit));
+    // A fence that is in the picture is a scale.
+    if let Some((_, words)) =
+        fence.as_ref().filter(|(fence_m, _)| -*fence_m > left.max(bottom) && *fence_m < right.min(top))
+    {
+        return plane.write(frame, (left, bottom), words, limit);
+    }
     plane.write(frame, (left, bottom), &scale, label);
-    if let Some(fence_m) = fence_m {
-        let words = format!("fence {} m", shortest(fence_m));
-        let style = theme.ground().fg(theme.ink(Ink::Limit));
-        // Beside the scale, or above it.
-        let apart = scale.chars().count() + words.len() < usize::from(plane.area.width);
-        let y = if apart { bottom } else { bottom + 1.5 * DOTS_UP * per_dot };
-        plane.write(frame, (right, y), &words, style);
+    // Of a part of it the name has its room where nothing else stands.
+    let nearest_m = libm::hypot(0.0_f64.clamp(left, right), 0.0_f64.clamp(bottom, top));
+    let farthest_m = libm::hypot(left.abs().max(right.abs()), bottom.abs().max(top.abs()));
+    if let Some((_, words)) = fence.filter(|(fence_m, _)| (nearest_m..farthest_m).contains(fence_m)) {
+        plane.beside(frame, (right, bottom), &[words], limit);
     }
 }
 

@@ -41,9 +41,12 @@ impl Plane {
         let (across, up) = (share(x, self.x), share(y, self.y));
         let inside = (0.0..=1.0).contains(&across) && (0.0..=1.0).contains(&up) && !self.area.is_empty();
         inside.then(|| {
-            let column = (across * f64::from(self.area.width)) as u16;
-            let row = ((1.0 - up) * f64::from(self.area.height)) as u16;
-            (self.area.x + column.min(self.area.width - 1), self.area.y + row.min(self.area.height - 1))
+            // The cell of the dot that a canvas draws there.
+            let cell = |share: f64, cells: u16, dots: f64| {
+                (libm::round(share * (f64::from(cells) * dots - 1.0)) / dots) as u16
+            };
+            let column = cell(across, self.area.width, DOTS_ACROSS);
+            (self.area.x + column, self.area.y + cell(1.0 - up, self.area.height, DOTS_UP))
         })
     }
 

@@ -212,8 +212,9 @@ impl<'a> VehicleState<'a> {
         Some(Planned { plan, time_to_go_s: plan.left_s(air.flown.time_s) })
     }
 
-    /// Ground position that the present velocity leads to, in the world's axes, m; NaN under a
-    /// parachute until it drifts with the wind.
+    /// Expected touchdown position in the world's axes, m: in the burn the end of its plan, before it
+    /// under the motor, otherwise where the present velocity leads to. NaN under a parachute until
+    /// it drifts with the wind.
     pub fn touchdown_m(&self, air: &Airborne<'_>) -> Vector2<f64> {
         let (place, velocity) = (&air.estimate.state.position_m, &air.estimate.state.velocity_m_s);
         if self.phase().before_apogee() {
@@ -227,7 +228,11 @@ impl<'a> VehicleState<'a> {
         if self.phase() == Phase::Chute && !self.is_carried(air) {
             return Vector2::repeat(f64::NAN);
         }
-        touchdown_m(place, velocity, air.height_m())
+        let landing_m = match self.phase() {
+            Phase::AeroDescent | Phase::LandArmed => self.computer.pilot().landing_m(),
+            _ => self.planned().and_then(|planned| planned.end_m()),
+        };
+        landing_m.unwrap_or_else(|| touchdown_m(place, velocity, air.height_m()))
     }
 
     /// A parachute carries it.
@@ -272,6 +277,11 @@ impl Planned<'_> {
         let end = self.plan.touchdown();
         let on_ground = end.height_m.abs() <= landing_miss;
         Touchdown { height_m: if on_ground { 0.0 } else { end.height_m }, ..end }
+    }
+
+    /// Position of its end, m.
+    fn end_m(&self) -> Option<Vector2<f64>> {
+        self.plan.states().last().map(|end| Vector2::new(end[0], end[1]))
     }
 
     /// Up to `N` points of its path, evenly spread, including both ends, and their number: north

@@ -333,8 +333,10 @@ impl Computer {
             }
             _ => {}
         }
-        if command == CrewCommand::Hold {
-            self.crew.held_by = by;
+        match command {
+            CrewCommand::Hold => self.crew.held_by = by,
+            CrewCommand::Start => self.crew.held_by = None,
+            _ => {}
         }
         if let Some((Proposal { act, by, .. }, confirmed_by)) = agreed {
             let words = format!("{}: asked by {by}, confirmed by {confirmed_by}", act.name());
@@ -432,6 +434,7 @@ impl Computer {
             return false;
         }
         self.table.report(Severity::Critical, why());
+        self.crew.held_by = None;
         self.table.apply(Event::Hold { cause, start }).is_ok()
     }
 

@@ -14,9 +14,9 @@ use alloc::vec::Vec;
 use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
 use super::{Computer, FRAME_S, SensedInput};
 use crate::control::servo::{GIMBALS, ServoModel};
-use crate::estimation::estimator::{Estimate, Health};
+use crate::estimation::estimator::{Estimate, GnssFix, Health, ImuSample, Measurements};
 use crate::estimation::motor_estimate::MotorStage;
-use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S};
+use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S, SENSORS};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::outputs::PyroOutput;
 use crate::rules::phase::{Latch, Phase};
@@ -29,10 +29,18 @@ pub enum Sign {
     Gnss,
     Barometer,
     Lidar,
-    /// The accelerometer repeats one sample.
-    Accelerometer,
+    /// A sensor, by its index in [`SENSORS`], sends no plausible sample.
+    Implausible(u8),
+    /// A sensor repeats one sample.
+    Repeats(u8),
+    /// A sensor changes by more in one sample than any motion.
+    Jumps(u8),
+    /// The estimated bias of the accelerometer or the gyro is beyond its data.
+    Biased(u8),
     /// The barometer disagrees with the other heights.
     HeightsDisagree,
+    /// The lidar disagrees with the other heights.
+    RangesDisagree,
     /// The estimate was unhealthy.
     Estimate,
     /// Gimbal pitch and yaw, then the fins: the surface does not follow its commands.
@@ -64,13 +72,27 @@ pub enum Sign {
 
 /// Every sign, and the time for which it must last to become a finding, s. Shorter signs are noise,
 /// a dropped sample or a gust.
-const RULES: [(Sign, f64); 25] = [
+const RULES: [(Sign, f64); 39] = [
     (Sign::Restart, 0.0),
     (Sign::Gnss, 0.0),
     (Sign::Barometer, 0.0),
     (Sign::Lidar, 0.0),
-    (Sign::Accelerometer, 0.0),
+    (Sign::Implausible(ACCELEROMETER), 0.0),
+    (Sign::Implausible(GYRO), 0.0),
+    (Sign::Repeats(ACCELEROMETER), 0.0),
+    (Sign::Repeats(GYRO), 0.0),
+    (Sign::Repeats(BAROMETER), 0.0),
+    (Sign::Repeats(GNSS), 0.0),
+    (Sign::Repeats(LIDAR), 0.0),
+    (Sign::Jumps(ACCELEROMETER), 0.0),
+    (Sign::Jumps(GYRO), 0.0),
+    (Sign::Jumps(BAROMETER), 0.0),
+    (Sign::Jumps(GNSS), 0.0),
+    (Sign::Jumps(LIDAR), 0.0),
+    (Sign::Biased(ACCELEROMETER), 0.1),
+    (Sign::Biased(GYRO), 0.1),
     (Sign::HeightsDisagree, 0.5),
+    (Sign::RangesDisagree, 0.2),
     (Sign::Estimate, 0.2),
     (Sign::Surface(0), 0.1),
     (Sign::Surface(1), 0.1),
@@ -106,6 +128,8 @@ pub struct Finding {
     pub beside: f64,
     /// Additional text.
     pub detail: String,
+    /// Another finding explains it.
+    pub follows: bool,
 }
 
 impl Finding {
@@ -117,12 +141,20 @@ impl Finding {
             Sign::Gnss => format!("GNSS lost for {value:.1} s"),
             Sign::Barometer => format!("barometer silent for {value:.1} s"),
             Sign::Lidar => format!("lidar silent from {beside:.0} m down"),
-            Sign::Accelerometer => format!("accelerometer repeats one sample for {value:.1} s"),
+            Sign::Implausible(sensor) => {
+                format!("{} sends no usable sample for {value:.2} s", name_of(sensor))
+            }
+            Sign::Repeats(sensor) => format!("{} repeats one sample for {value:.1} s", name_of(sensor)),
+            Sign::Jumps(sensor) => {
+                format!("{} jumps by {value:.1} {} in one sample", name_of(sensor), unit_of(sensor))
+            }
+            Sign::Biased(sensor) => format!("{} is off by {value:.1} {}", name_of(sensor), unit_of(sensor)),
+            Sign::RangesDisagree => format!("lidar {value:.1} m from the other heights"),
             Sign::HeightsDisagree => format!("barometer {value:.1} m from the other heights"),
             Sign::Estimate => format!("estimate unhealthy for {held_s:.1} s: {detail}"),
             Sign::Surface(surface) => {
                 let name = SURFACE_NAMES.get(usize::from(surface)).unwrap_or(&"surface");
-                format!("{name} {value:.1} deg from where its commands take it, at {beside:.1} deg")
+                format!("{name} {value:.1} deg from where its commands take it, at {beside:.1} deg{detail}")
             }
             Sign::SlowGimbal => format!("gimbal turns at {value:.0} deg/s at most, not {beside:.0}"),
             Sign::Battery => format!("battery down to {value:.2} V"),
@@ -164,12 +196,19 @@ struct SignWatch {
 }
 
 /// The findings of a flight.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Findings {
     watcher: Option<Watcher>,
     watches: [SignWatch; RULES.len()],
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
+}
+
+impl Default for Findings {
+    fn default() -> Self {
+        let watches = [SignWatch::default(); RULES.len()];
+        Self { watcher: None, watches, found: Vec::new(), thrust_over_weight: None }
+    }
 }
 
 impl Findings {
@@ -208,11 +247,15 @@ impl Findings {
                     value,
                     beside,
                     detail,
+                    follows: false,
                 });
                 self.found.len() - 1
             });
             let finding = &mut self.found[place];
             finding.held_s += FRAME_S;
+            if matches!(sign, Sign::Surface(_)) && finding.detail != seen.detail {
+                finding.detail = seen.detail.to_string();
+            }
             if seen.size > watch.worst {
                 watch.worst = seen.size;
                 (finding.value, finding.beside) = (seen.value, seen.beside);
@@ -225,12 +268,62 @@ impl Findings {
         &self.found
     }
 
-    /// The findings so far, in order of time.
+    /// The findings so far: causes, then what follows from them, each in order of time.
     pub fn found(&self) -> Vec<Finding> {
         let mut found = self.found.clone();
         found.sort_by(|a, b| a.since_s.total_cmp(&b.since_s).then(a.sign.cmp(&b.sign)));
+        for place in 0..found.len() {
+            let at = &found[place];
+            found[place].follows =
+                found.iter().any(|other| other.since_s <= at.since_s && at.sign.follows_from(other.sign));
+        }
+        found.sort_by_key(|finding| finding.follows);
         found
     }
+}
+
+impl Sign {
+    /// Whether another sign that began before explains this one.
+    fn follows_from(self, other: Self) -> bool {
+        let inertial = |sensor: u8| [ACCELEROMETER, GYRO].contains(&sensor);
+        let is_effect = |sign| {
+            matches!(sign, Self::Estimate | Self::NoPlan | Self::Tumbles | Self::Gate | Self::Biased(_))
+        };
+        match other {
+            // What the unit did not measure is missing in every estimate from then on.
+            Self::Restart => !matches!(self, Self::Restart | Self::Surface(_) | Self::Battery),
+            Self::Implausible(sensor) | Self::Repeats(sensor) | Self::Jumps(sensor) if inertial(sensor) => {
+                is_effect(self)
+                    || matches!(
+                        self,
+                        Self::HeightsDisagree
+                            | Self::RangesDisagree
+                            | Self::LateLight
+                            | Self::Impulse
+                            | Self::BurntOutEarly
+                            | Self::Latched
+                            | Self::AscentMotor
+                    )
+            }
+            Self::Biased(_) => is_effect(self) && !matches!(self, Self::Biased(_)),
+            other => !is_effect(other) && is_effect(self),
+        }
+    }
+}
+
+/// The sensors by their index in [`SENSORS`].
+const ACCELEROMETER: u8 = 0;
+const GYRO: u8 = 1;
+const BAROMETER: u8 = 2;
+const GNSS: u8 = 3;
+const LIDAR: u8 = 4;
+
+fn name_of(sensor: u8) -> &'static str {
+    SENSORS.get(usize::from(sensor)).unwrap_or(&"sensor")
+}
+
+fn unit_of(sensor: u8) -> &'static str {
+    ["m/s2", "deg/s", "m", "m", "m"].get(usize::from(sensor)).unwrap_or(&"")
 }
 
 /// The same time if the last fix came before the end of the boost, s: none of three receivers holds
@@ -271,6 +364,111 @@ const HEIGHTS_APART_M: f64 = 6.0;
 /// Height below which a plan ends, m.
 const PLANS_ABOVE_M: f64 = 2.0;
 
+/// Largest change of each sensor from one sample to the next beyond that of the estimated motion:
+/// twice the largest of 600 flights of three missions in `real` that stand.
+const JUMP: [f64; SENSORS.len()] = [20.0, 100.0, 6.0, 12.0, 2.0];
+/// Time without a plausible inertial sample, s.
+const IMPLAUSIBLE_S: f64 = 0.02;
+/// Largest estimated bias of a working accelerometer, m/s^2, and of a gyro, deg/s.
+const BIASED: [f64; 2] = [1.0, 4.0];
+/// Number of deviating frames from which on a surface's motion is explained, and the share of the
+/// deviation that the explanation leaves.
+const EXPLAINED_FRAMES: u32 = 12;
+const EXPLAINED_SHARE: f64 = 0.3;
+/// Explanations of a surface's motion: it follows another surface's command, or its own mirrored.
+const FOLLOWS: [&str; SURFACES + 3] = [
+    ": takes gimbal pitch's commands",
+    ": takes gimbal yaw's commands",
+    ": takes fin 1's commands",
+    ": takes fin 2's commands",
+    ": takes fin 3's commands",
+    ": takes fin 4's commands",
+    ": moves the wrong way",
+    ": does not move",
+    ": too slow",
+];
+const MIRRORED: usize = SURFACES;
+const HELD: usize = SURFACES + 1;
+const LAGS: usize = SURFACES + 2;
+
+/// How a surface moves while it does not follow its commands.
+#[derive(Debug, Clone, Copy, Default)]
+struct Motion {
+    frames: u32,
+    /// Sums of the squared deviations from each surface's modelled position, and from its own
+    /// mirrored, rad^2.
+    off_rad2: [f64; SURFACES + 1],
+    /// Smallest and largest measured angle, rad.
+    span_rad: Option<[f64; 2]>,
+    last_rad: f64,
+    /// Turned towards its commands, and altogether, rad.
+    turned_rad: [f64; 2],
+}
+
+impl Motion {
+    fn explained(&self, own: usize) -> &'static str {
+        if self.frames < EXPLAINED_FRAMES {
+            return "";
+        }
+        let limit = EXPLAINED_SHARE * EXPLAINED_SHARE * self.off_rad2[own];
+        let best = (0..=MIRRORED).filter(|place| *place != own && self.off_rad2[*place] < limit);
+        let best = best.min_by(|a, b| self.off_rad2[*a].total_cmp(&self.off_rad2[*b]));
+        let width_rad = self.span_rad.map_or(0.0, |[low, high]| high - low);
+        let is_held = width_rad < 0.5 * AWAY_RAD[usize::from(own >= GIMBALS)];
+        let [towards_rad, all_rad] = self.turned_rad;
+        best.or(is_held.then_some(HELD))
+            .or((towards_rad > 0.8 * all_rad).then_some(LAGS))
+            .map_or("", |place| FOLLOWS[place])
+    }
+}
+
+/// The last sample of each sensor, with its time, s.
+#[derive(Debug, Clone, Copy, Default)]
+struct LastSamples {
+    imu: Option<ImuSample>,
+    pressure_m: Option<(f64, f64)>,
+    fix: Option<GnssFix>,
+    range_m: Option<(f64, f64)>,
+}
+
+impl LastSamples {
+    /// Takes a frame's measurements. Returns the change of each sensor beyond that of the estimated
+    /// motion, with its sign, in its unit.
+    fn take(&mut self, measured: &Measurements, estimate: &Estimate, time_s: f64) -> [f64; SENSORS.len()] {
+        let mut jumps = [0.0; SENSORS.len()];
+        let climb_m_s = estimate.state.velocity_m_s.z;
+        let largest =
+            |values: &[f64]| values.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        if let Some(before) = self.imu.replace(measured.imu) {
+            // The force along the nose changes at once with each motor and charge.
+            let force_m_s2 = measured.imu.specific_force_m_s2 - before.specific_force_m_s2;
+            jumps[0] = largest(&[force_m_s2.y, force_m_s2.z]);
+            let turn_rad_s: [f64; 3] = (measured.imu.gyro_rad_s - before.gyro_rad_s).into();
+            jumps[1] = largest(&turn_rad_s).to_degrees();
+        }
+        if let Some(now_m) = measured.pressure_altitude_m
+            && let Some((before_m, before_s)) = self.pressure_m.replace((now_m, time_s))
+        {
+            jumps[2] = now_m - before_m - climb_m_s * (time_s - before_s);
+        }
+        if let Some(fix) = measured.gnss
+            && let Some(before) = self.fix.replace(fix)
+        {
+            let moved_m =
+                (fix.velocity_m_s + before.velocity_m_s) * (0.5 * (fix.valid_at_s - before.valid_at_s));
+            jumps[3] = (fix.position_m - before.position_m - moved_m).norm();
+        }
+        let nose_up = estimate.state.nose_in_world().z;
+        if let Some(now_m) = measured.lidar_range_m
+            && let Some((before_m, before_s)) = self.range_m.replace((now_m, time_s))
+            && nose_up > LIDAR_COS_TILT
+        {
+            jumps[4] = now_m - before_m - climb_m_s / nose_up * (time_s - before_s);
+        }
+        jumps
+    }
+}
+
 /// Memory of the rules from earlier frames.
 #[derive(Debug, Clone)]
 struct Watcher {
@@ -282,6 +480,10 @@ struct Watcher {
     /// The barometer's last altitude, m.
     pressure_m: Option<f64>,
     surfaces: [ServoModel; SURFACES],
+    motions: [Motion; SURFACES],
+    last: LastSamples,
+    /// Changes of the sensors in this frame.
+    jumps: [f64; SENSORS.len()],
     /// Gimbal angles in the frame before, rad.
     gimbal_rad: [f64; 2],
     /// In the burn: the number of frames in which each axis had to turn fast, and the largest turn
@@ -310,6 +512,9 @@ impl Watcher {
             gnss_since_boost: false,
             pressure_m: None,
             surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
+            motions: [Motion::default(); SURFACES],
+            last: LastSamples::default(),
+            jumps: [0.0; SENSORS.len()],
             gimbal_rad: flown.gimbal_rad,
             turns: [(0, 0.0); 2],
             boost_m_s: 0.0,
@@ -330,7 +535,9 @@ impl Watcher {
             let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
             self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
             self.gimbal_rad = flown.gimbal_rad;
+            self.last = LastSamples::default();
         }
+        self.jumps = self.last.take(&flown.measured, estimate, time_s);
         self.pressure_m = flown.measured.pressure_altitude_m.or(self.pressure_m);
         if flown.measured.gnss.is_some() {
             self.gnss_since_boost = phase != Phase::Boost;
@@ -345,6 +552,7 @@ impl Watcher {
             servo.advance();
             servo.take(command_rad);
         }
+        self.take_motions(computer, flown);
         let slow_rad = SLOW * computer.pilot().mission().airframe.gimbal.servo.rate_rad_s() * FRAME_S;
         for axis in (0..GIMBALS).filter(|_| phase == Phase::Powered && !self.down) {
             let (frames, turned_rad) = &mut self.turns[axis];
@@ -364,6 +572,37 @@ impl Watcher {
         self.down |= flown.contact && !phase.before_apogee();
         self.astray |= phase.in_landing_burn() && nose_up < ASTRAY_COS_TILT;
         self.must_see_s = if near { self.must_see_s.or(Some(time_s)) } else { None };
+    }
+
+    /// Compares surfaces that do not follow their commands with what would explain it.
+    fn take_motions(&mut self, computer: &Computer, flown: &SensedInput) {
+        let fins = &computer.pilot().mission().airframe.fins;
+        let both_stops_rad = fins.closed_rad() + fins.open_rad();
+        let measured_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
+        let model_rad = self.surfaces.each_ref().map(|servo| servo.at_rad);
+        for (own, (motion, at_rad)) in self.motions.iter_mut().zip(measured_rad).enumerate() {
+            let is_fin = own >= GIMBALS;
+            let off_rad = at_rad - model_rad[own];
+            if off_rad.abs() <= AWAY_RAD[usize::from(is_fin)] {
+                continue;
+            }
+            let mirrored_rad = if is_fin { both_stops_rad - model_rad[own] } else { -model_rad[own] };
+            for (sum_rad2, expected_rad) in
+                motion.off_rad2.iter_mut().zip(model_rad.into_iter().chain([mirrored_rad]))
+            {
+                *sum_rad2 += (at_rad - expected_rad) * (at_rad - expected_rad);
+            }
+            if let Some([low_rad, high_rad]) = motion.span_rad {
+                let turned_rad = at_rad - motion.last_rad;
+                motion.turned_rad[0] += if turned_rad * off_rad < 0.0 { turned_rad.abs() } else { 0.0 };
+                motion.turned_rad[1] += turned_rad.abs();
+                motion.span_rad = Some([low_rad.min(at_rad), high_rad.max(at_rad)]);
+            } else {
+                motion.span_rad = Some([at_rad; 2]);
+            }
+            motion.last_rad = at_rad;
+            motion.frames += 1;
+        }
     }
 
     /// Whether a sign shows in this frame.
@@ -422,9 +661,33 @@ fn seen_in_flight(
             let silent_s = lidar_s.min(time_s - must_see_s);
             (silent_s > LIDAR_LOST_S).then(|| seen(time_s - silent_s, silent_s, high_m, ""))
         }
-        Sign::Accelerometer => {
-            let frozen_s = computer.sensors().accelerometer_frozen_s()?;
-            Some(seen(time_s - frozen_s, frozen_s, 0.0, ""))
+        Sign::Implausible(sensor) => {
+            let [silent_s, _] = computer.sensors().lost_s()[usize::from(sensor)];
+            (silent_s > IMPLAUSIBLE_S).then(|| seen(time_s - silent_s, silent_s, 0.0, ""))
+        }
+        Sign::Repeats(sensor) => {
+            let [_, repeats_s] = computer.sensors().lost_s()[usize::from(sensor)];
+            (repeats_s > 0.0).then(|| seen(time_s - repeats_s, repeats_s, 0.0, ""))
+        }
+        Sign::Jumps(sensor) => {
+            let jump = watcher.jumps[usize::from(sensor)];
+            (jump.abs() > JUMP[usize::from(sensor)]).then(|| Hit { size: jump.abs(), ..now(jump, 0.0) })
+        }
+        Sign::Biased(sensor) => {
+            let bias = if sensor == GYRO {
+                estimate.gyro_bias_rad_s.map(f64::to_degrees)
+            } else {
+                estimate.accelerometer_bias_m_s2
+            };
+            let bias = bias.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+            (bias.abs() > BIASED[usize::from(sensor)]).then(|| Hit { size: bias.abs(), ..now(bias, 0.0) })
+        }
+        Sign::RangesDisagree => {
+            let nose_up = estimate.state.nose_in_world().z;
+            let range_height_m = flown.measured.lidar_range_m.unwrap_or(watcher.last.range_m?.0) * nose_up;
+            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
+            (falls && nose_up > LIDAR_COS_TILT && pilot.estimator().others_contradict_m(range_height_m))
+                .then(|| now((range_height_m - height_m).abs(), 0.0))
         }
         Sign::HeightsDisagree => {
             let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
@@ -442,8 +705,10 @@ fn seen_in_flight(
             let surface = usize::from(surface);
             let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad)[surface];
             let away_rad = (at_rad - watcher.surfaces[surface].at_rad).abs();
-            (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)])
-                .then(|| now(away_rad.to_degrees(), at_rad.to_degrees()))
+            (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)]).then(|| Hit {
+                detail: watcher.motions[surface].explained(surface),
+                ..now(away_rad.to_degrees(), at_rad.to_degrees())
+            })
         }
         Sign::SlowGimbal => {
             let servo = &mission.airframe.gimbal.servo;

@@ -144,7 +144,9 @@ impl Computer {
         let planned =
             flown.filter(|_| input.plan_ready).is_some_and(|flown| self.pilot.take_over(flown.time_s));
         if let Some(flown) = &flown {
-            self.pilot.estimate_state(self.table.mode().phase, flown, &self.sensors);
+            let phase = self.table.mode().phase;
+            let is_over = matches!(phase, Phase::Touchdown | Phase::Safed) && self.is_over();
+            self.pilot.estimate_state((phase, is_over), flown, &self.sensors);
             self.pilot.predict(&mut self.table, flown);
         }
         let answers = input.requests.iter().map(|request| self.answer(request)).collect();

@@ -18,6 +18,9 @@ pub(super) const FROZEN_IMU: u32 = 4;
 /// receiver at rest may repeat one fix (static hold).
 const FROZEN_BAROMETER: u32 = 25;
 const FROZEN_RANGES: u32 = 100;
+/// The same of a receiver and of a lidar in motion.
+const FROZEN_FIXES: u32 = 3;
+const FROZEN_IN_MOTION: u32 = 10;
 /// Range below which a lidar may miss the ground, m (TF-Luna, Benewake).
 pub const LIDAR_BLIND_M: f64 = 0.2;
 /// Permitted deviation of a range at rest, m: noise, grass and slope are smaller.
@@ -187,6 +190,22 @@ impl SensorWatch {
     /// Time for which the accelerometer has repeated one sample, s; `None` if it does not.
     pub fn accelerometer_frozen_s(&self) -> Option<f64> {
         self.accelerometer.repeats_for_s(FROZEN_IMU, self.time_s)
+    }
+
+    /// Time without a plausible sample, and time for which a sensor in motion has repeated one, s,
+    /// in the order of [`SENSORS`].
+    pub fn lost_s(&self) -> [[f64; 2]; SENSORS.len()] {
+        fn of<const N: usize>(channel: &Channel<N>, frozen: u32, time_s: f64) -> [f64; 2] {
+            [channel.silent_s(time_s), channel.repeats_for_s(frozen, time_s).unwrap_or(0.0)]
+        }
+        let time_s = self.time_s;
+        [
+            of(&self.accelerometer, FROZEN_IMU, time_s),
+            of(&self.gyro, FROZEN_IMU, time_s),
+            of(&self.barometer, FROZEN_BAROMETER, time_s),
+            of(&self.gnss, FROZEN_FIXES, time_s),
+            of(&self.lidar, FROZEN_IN_MOTION, time_s),
+        ]
     }
 
     /// Whether the accelerometer is frozen or implausible.

@@ -62,7 +62,7 @@ fn started(root: &Path) -> Terminal {
 
 fn land(root: &Path) -> Result<(), Failure> {
     let mut terminal = started(root);
-    let shown = ["Rising", "Falling", "Landing", "On the ground"];
+    let shown = ["BOOST", "AERO_DESCENT", "POWERED", "TOUCHDOWN"];
     for phase in shown {
         wait(&terminal, phase)?;
     }
@@ -76,7 +76,7 @@ fn land(root: &Path) -> Result<(), Failure> {
 /// An abort with room for the parachute opens it and inhibits the landing motor.
 fn abort(root: &Path) -> Result<(), Failure> {
     let mut terminal = started(root);
-    wait(&terminal, "Falling")?;
+    wait(&terminal, "AERO_DESCENT")?;
     terminal.type_bytes(b"\x18\r");
     let seen = |window: &Window| {
         window
@@ -85,7 +85,7 @@ fn abort(root: &Path) -> Result<(), Failure> {
     };
     terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
     wait(&terminal, "Parachute")?;
-    wait(&terminal, "On the ground")?;
+    wait(&terminal, "TOUCHDOWN")?;
     let report = end(&mut terminal, Exit::RefusedOrAborted)?;
     expect(&report, "ABORTED")?;
     print_line("aborted in the descent, down under the parachute:")?;

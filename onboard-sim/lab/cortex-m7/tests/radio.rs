@@ -76,7 +76,9 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     // On a busy machine the radio may be silent for a second, which holds the countdown: then the
     // crew starts it again.
     let falls = |screen: &Terminal| {
-        screen.wait_within(Duration::from_secs(30), |window| window.shows("Falling").then_some(())).is_some()
+        screen
+            .wait_within(Duration::from_secs(30), |window| window.shows("AERO_DESCENT").then_some(()))
+            .is_some()
     };
     let flown = (0..3).any(|_| {
         screen.type_until(b"AARM\r", " ARMED ");
@@ -86,7 +88,7 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     assert!(flown, "{}", screen.window().rows().join("\n"));
     screen.type_bytes(b"\x18\r");
     screen.wait_for("Parachute");
-    screen.wait_for("On the ground");
+    screen.wait_for("TOUCHDOWN");
     let world = chain.wait();
     assert_eq!(world.code, Some(4), "{}", world.output);
     for words in ["ABORTED", "parachute deployed"] {

@@ -13,17 +13,17 @@ fn run(arguments: &[&Path]) -> (Option<i32>, String) {
 }
 
 #[test]
-fn the_recording_stands_beside_the_log_and_what_goes_wrong_is_said() {
+fn the_recording_is_written_beside_the_log_and_errors_are_reported() {
     let (folder, log, rrd) = folder();
     write_log(&log);
     let bytes = std::fs::read(&log).unwrap();
     assert_eq!(run(&[&log]), (Some(0), format!("replay-rerun: {}: 4 poses, 1 events\n", rrd.display())));
-    let (code, said) = run(&[&log]);
-    assert!(code == Some(0) && rrd.with_file_name("flight-2.rrd").is_file(), "{said}");
+    let (code, output) = run(&[&log]);
+    assert!(code == Some(0) && rrd.with_file_name("flight-2.rrd").is_file(), "{output}");
     std::fs::write(&log, &bytes[..in_the_third_chunk(&bytes)]).unwrap();
     std::fs::remove_file(&rrd).unwrap();
-    let (code, said) = run(&[&log, Path::new("-o"), &rrd]);
-    assert!(code == Some(0) && said.contains("flight.mcap is damaged: ends after"), "{said}");
+    let (code, output) = run(&[&log, Path::new("-o"), &rrd]);
+    assert!(code == Some(0) && output.contains("flight.mcap is damaged: ends after"), "{output}");
     assert!(std::fs::read(&rrd).unwrap().starts_with(b"RRF2"));
     assert_eq!(run(&[&folder.path().join("missing.mcap")]).0, Some(1));
     assert_eq!(run(&[]).0, Some(2), "wrong usage");

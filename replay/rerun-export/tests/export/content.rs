@@ -11,7 +11,7 @@ use crate::read_back::Recording;
 use crate::station::station_log;
 
 #[test]
-fn a_flight_is_exported_whole() {
+fn a_complete_flight_is_exported() {
     let (_folder, log, rrd) = folder();
     write_log(&log);
     let (_, exported) = export(&log, None, &rrd).unwrap();

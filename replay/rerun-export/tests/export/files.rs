@@ -31,7 +31,7 @@ fn the_readable_part_of_a_cut_log_is_exported() {
 }
 
 #[test]
-fn what_exists_is_kept_and_a_recording_gets_the_next_free_name() {
+fn existing_files_are_not_overwritten_and_a_recording_gets_the_next_free_name() {
     let (folder, log, rrd) = folder();
     let other = folder.path().join("other.mcap");
     write_log(&log);

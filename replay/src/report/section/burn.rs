@@ -133,7 +133,7 @@ mod tests {
         let of = |scales, [impulse_sigma, burn_time_sigma]: [f64; 2], nearest| {
             let mut mission = flight::vehicles::mission::builtin("mk2").unwrap().unwrap();
             (mission.motor.impulse_sigma, mission.motor.burn_time_sigma) = (impulse_sigma, burn_time_sigma);
-            // Nobody has burnt any of its lot.
+            // No motor of its lot was fired.
             assert_eq!(mission.motor_burns(), 0);
             another_curve(scales, &mission, nearest)
         };

@@ -2,10 +2,10 @@
 
 mod burn;
 mod first;
+mod log;
 pub(super) mod motion;
 mod pictures;
 mod place;
-mod whole;
 
 use super::html::{charts, paragraph};
 use super::track::Flight;
@@ -35,9 +35,9 @@ pub(super) fn all(flight: &Flight, info: &Info) -> Vec<Section> {
         ("solver", "Solver", text(burn::plans(flight))),
         ("battery", "Battery", String::new()),
         ("link", "Link", String::new()),
-        ("mission", "Mission against the built-in one", text(whole::mission(flight, info))),
-        ("events", "Events", text(whole::events(flight))),
-        ("log", "Log", whole::described(info)),
+        ("mission", "Mission against the built-in one", text(log::mission(flight, info))),
+        ("events", "Events", text(log::events(flight))),
+        ("log", "Log", log::described(info)),
     ];
     let mut missing = Vec::new();
     let mut all: Vec<Section> = Vec::new();

@@ -86,7 +86,7 @@ pub(super) fn all(flight: &Flight) -> Vec<Picture<'_>> {
 fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
     let mission = flight.pilot.as_ref().map(Pilot::mission);
     let over = |section, part, title: &str| Picture::new(flight, section, part, title);
-    let mut whole = over("first", Whole, "Height over the whole flight, m")
+    let mut height = over("first", Whole, "Height over the whole flight, m")
         .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
         .line("flown", "a", flight.flown(|state| state[HEIGHT]))
         .line(PLANNED, "b", flight.planned_first(|state| state[HEIGHT]));
@@ -95,9 +95,9 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         let height_m = sample.state[HEIGHT];
         (flight.axis_s(sample.time_s), height_m, "place", format!("{name} {height_m:.0} m"))
     };
-    (whole.chart.places, whole.chart.named, whole.chart.size_px) =
+    (height.chart.places, height.chart.named, height.chart.size_px) =
         (shown.map(place).collect(), true, Some((640.0, 130.0)));
-    let mut pictures = vec![whole];
+    let mut pictures = vec![height];
     for (component, (name, unit, factor)) in COMPONENTS.into_iter().enumerate() {
         pictures.push(
             over("burn", Burn, &format!("{name}, {unit}"))
@@ -137,7 +137,7 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
     pictures
 }
 
-/// A servo's axis, as it was and as it was told to be.
+/// The measured and the commanded angle of a servo.
 fn surface(picture: Picture<'_>, surface: usize) -> Picture<'_> {
     let [actual, commanded] = surface_deg(picture.flight, surface);
     picture.line("commanded", "b", commanded).line("actual", "a", actual)
@@ -205,9 +205,9 @@ fn of_the_rest(flight: &Flight) -> Vec<Picture<'_>> {
             .limits(timings.first().map(|timing| 1e3 * timing.deadline_s))
             .only(took.collect()),
         over("battery", Whole, "Battery voltage, V").only(flight.framed(|frame| frame.input.battery_v)),
-        over("link", Whole, "Age of the last heartbeat, s").only(flight.heard(|told| told.link_age_s)),
-        over("link", Whole, "Frames lost, %").only(flight.heard(|told| Some(100.0 * told.link_loss?))),
-        over("link", Whole, "Received, bytes/s").only(flight.heard(|told| told.link_rx_bytes_s)),
+        over("link", Whole, "Age of the last heartbeat, s").only(flight.received(|sample| sample.link_age_s)),
+        over("link", Whole, "Frames lost, %").only(flight.received(|sample| Some(100.0 * sample.link_loss?))),
+        over("link", Whole, "Received, bytes/s").only(flight.received(|sample| sample.link_rx_bytes_s)),
     ];
     // A fin that did not follow has a picture of its own.
     let stuck = (0..4).filter(|fin| flight.shown.contains(&FINS[*fin]));
@@ -235,8 +235,8 @@ pub(super) fn surface_deg(flight: &Flight, surface: usize) -> [Series; 2] {
         ]
     } else {
         [
-            flight.heard(|told| deg(&told.gimbal_measured_rad, &told.fin_measured_rad)),
-            flight.heard(|told| deg(&told.gimbal_commanded_rad, &told.fin_commanded_rad)),
+            flight.received(|sample| deg(&sample.gimbal_measured_rad, &sample.fin_measured_rad)),
+            flight.received(|sample| deg(&sample.gimbal_commanded_rad, &sample.fin_commanded_rad)),
         ]
     }
 }

@@ -17,7 +17,7 @@ const STAGES: [Stage; 4] = [
 ];
 
 /// The title of the map.
-const WHOLE: &str = "Place from above, m";
+const COMPLETE: &str = "Place from above, m";
 
 /// The place from above: inside its fence, and closer.
 pub(super) fn maps(flight: &Flight) -> String {
@@ -29,9 +29,12 @@ pub(super) fn maps(flight: &Flight) -> String {
         };
         line(&format!("fence {fence_m:.0} m"), "fence", (0..=360).step_by(5).map(corner).collect())
     });
-    let lit = |time_s: f64| flight.ignition_s.is_some_and(|ignition_s| time_s >= ignition_s);
-    let wind =
-        flight.decisions.iter().find(|decision| lit(decision.time_s)).and_then(|decision| decision.estimate);
+    let ignited = |time_s: f64| flight.ignition_s.is_some_and(|ignition_s| time_s >= ignition_s);
+    let wind = flight
+        .decisions
+        .iter()
+        .find(|decision| ignited(decision.time_s))
+        .and_then(|decision| decision.estimate);
     // East is against y.
     let wind = wind.map(|estimate| (-estimate.wind_m_s.y, estimate.wind_m_s.x));
     let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
@@ -45,8 +48,8 @@ pub(super) fn maps(flight: &Flight) -> String {
         arrow: arrow.clone(),
         ..Chart::default()
     };
-    let Some(fence) = fence else { return picture(WHOLE, None).svg() };
-    picture(WHOLE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
+    let Some(fence) = fence else { return picture(COMPLETE, None).svg() };
+    picture(COMPLETE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
 }
 
 /// The pad, where the first plan ends, and where it came down.

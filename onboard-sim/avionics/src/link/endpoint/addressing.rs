@@ -15,7 +15,7 @@ use protocol::mission::Expected;
 use super::VehicleEndpoint;
 use crate::link::commands::{Command, Unfit};
 use crate::link::stations::SAME_IDS_FOR_S;
-use crate::link::vehicle::VehicleState;
+use crate::link::vehicle::{VehicleKind, VehicleState};
 
 /// Time after a frame of another vehicle under our ids, s, for which a command must name the boot
 /// that it is addressed to.
@@ -71,13 +71,14 @@ impl VehicleEndpoint {
                 let why = "another vehicle has these ids: name the boot that it is for in parameter 7";
                 return refused(not_now, why.to_owned());
             }
-            AddressedBoot::Any => {
-                // A stranger beside the crew's station, whose screen does not show what it does.
-                if let Some(ours) = self.stations.ours_beside(station, vehicle.time_s) {
-                    let why = format!("{ours} is at the controls: name boot {us} in parameter 7");
-                    return refused(denied, why);
-                }
+            // A program that names no boot has not received this vehicle's status. Other ground
+            // stations fly a simulated vehicle without one, unless a Touchdown station commands it.
+            AddressedBoot::Any
+                if self.identity.kind == VehicleKind::Real || self.stations.has_received_touchdown() =>
+            {
+                return refused(denied, format!("name boot {us} in parameter 7"));
             }
+            AddressedBoot::Any => {}
         }
         let others = self.stations.same_ids(station, vehicle.time_s);
         if others > 0 {

@@ -400,10 +400,10 @@ impl VehicleEndpoint {
                 (unfit.result, unfit.reason)
             }
             Err(unfit) => (unfit.result, unfit.reason),
-            Ok(Command::Vehicle(command)) => return self.put(link, (request, by, station), command, vehicle),
+            Ok(Command::Vehicle(command)) => return self.put(path, (request, by, station), command, vehicle),
             Ok(Command::ForcedDisarm) => {
                 let command = if means_abort(vehicle) { CrewCommand::Abort } else { CrewCommand::Disarm };
-                return self.put(link, (request, by, station), command, vehicle);
+                return self.put(path, (request, by, station), command, vehicle);
             }
             Ok(Command::SetInterval { message_id, interval_us }) => {
                 let now_s = self.now_s;
@@ -432,7 +432,7 @@ impl VehicleEndpoint {
         if cancelled.is(MavCmd::MAV_CMD_TD_PAD_CHECK) && vehicle.computer.pad_check().is_running() {
             let key = by.map_or(0, |by| by.number);
             let station = self.stations.of(&Sender { address: cancelled.source, key, path });
-            self.put(path.link, (cancelled, by, station), CrewCommand::EndCheck, vehicle);
+            self.put(path, (cancelled, by, station), CrewCommand::EndCheck, vehicle);
         } else {
             self.acknowledge(path.link, cancelled, (MavResult::MAV_RESULT_DENIED, None));
         }

@@ -9,17 +9,20 @@ use alloc::vec::Vec;
 
 use flight::computer::Commander;
 use flight::computer::crew::{Answer, CrewCommand, Ending, People, Request};
+use flight::computer::messages::Severity;
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
 use flight::rules::phase::Phase;
 use flight::rules::two_person::Station;
 use protocol::command::{CommandAnswer, CommandRequest};
 use protocol::dialect::MavResult;
+use protocol::hub::Origin;
 use protocol::identity::Address;
 
 use super::VehicleEndpoint;
 use super::addressing::can_move;
 use crate::link::commands;
+use crate::link::stations::Path;
 use crate::link::vehicle::VehicleState;
 
 /// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many
@@ -42,7 +45,7 @@ pub struct UplinkState {
 /// A command that the vehicle decides in its next frame.
 #[derive(Debug, Clone)]
 pub(super) struct Waiting {
-    link: usize,
+    path: Path,
     command: CommandRequest,
     request: Request,
 }
@@ -77,11 +80,19 @@ impl VehicleEndpoint {
     /// Gives a command to the vehicle's next frame.
     pub(super) fn put(
         &mut self,
-        link: usize,
+        path: Path,
         (command, by, station): (&CommandRequest, Option<Operator>, Station),
         crew_command: CrewCommand,
         vehicle: &VehicleState<'_>,
     ) {
+        let link = path.link;
+        // No operator has requested a hold that the station decided by itself.
+        let reason = command.station_hold().filter(|_| crew_command == CrewCommand::Hold);
+        let by = by.filter(|_| reason.is_none());
+        if let Some(reason) = reason.filter(|_| vehicle.mode().countdown_end_s.is_some()) {
+            let words = format!("station {station} holds by itself: {}", reason.words());
+            self.send_text(Severity::Warning, &words);
+        }
         // A command that moves something is executed once, however late a repetition arrives; one
         // that stops is executed every time.
         if can_move(crew_command) {
@@ -125,7 +136,7 @@ impl VehicleEndpoint {
         {
             return;
         }
-        self.waiting.push(Waiting { link, command: *command, request });
+        self.waiting.push(Waiting { path, command: *command, request });
     }
 
     /// Uplink state for the vehicle's next frame, with the crew's requests.
@@ -140,8 +151,10 @@ impl VehicleEndpoint {
     /// requests are dropped.
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
         let waiting = core::mem::take(&mut self.waiting);
-        for (Waiting { link, command, request }, answer) in waiting.into_iter().zip(answers) {
+        for (Waiting { path, command, request }, answer) in waiting.into_iter().zip(answers) {
+            let link = path.link;
             self.note_commander(&request, answer, vehicle);
+            self.name_sender(path, &request, answer);
             // A COMMAND_CANCEL has no parameters.
             let is_cancelled = request.command == CrewCommand::EndCheck && command.params[0].is_nan();
             let result = match commands::mav_result(answer.ending) {
@@ -164,6 +177,23 @@ impl VehicleEndpoint {
         // It has disarmed itself: the next station that arms it is in command.
         if vehicle.phase() == Phase::PadIdle {
             self.stations.set_commander(None);
+        }
+    }
+
+    /// Reports from where a station arms, starts, takes command or aborts beside another station,
+    /// which may not be of its crew.
+    fn name_sender(&mut self, path: Path, request: &Request, answer: &Answer) {
+        use CrewCommand as C;
+        let Some(station) = request.station.filter(|station| self.stations.has_others(*station)) else {
+            return;
+        };
+        let acts = matches!(request.command, C::Arm | C::Start | C::TakeCommand | C::Abort);
+        if acts && answer.ending == Ending::Accepted {
+            let from = match path.origin {
+                Some(Origin::Datagram(from)) => format!("at {from}"),
+                Some(Origin::Stream(_)) | None => format!("over link {}", path.link + 1),
+            };
+            self.send_text(Severity::Warning, &format!("{station} {from}: {}", request.command.name()));
         }
     }
 

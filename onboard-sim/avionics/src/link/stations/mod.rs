@@ -139,6 +139,7 @@ flight::with_defaults! {
         numbered: u32 = 0,
         /// Index of the station that gets the next report.
         next: usize = 0,
+        touchdown: bool = false,
         refused: Option<Refused> = None,
         refused_count: u16 = 0,
         commander: Option<(Station, Option<Operator>)> = None,
@@ -173,6 +174,7 @@ impl Stations {
         peer.accepted_at_s = time_s;
         let Some(session) = session else { return };
         peer.session = session;
+        self.touchdown |= session != 0;
         peer.heartbeat_at_s = Some(time_s);
         peer.deaf = is_deaf(frame);
         peer.learn(sender.path);
@@ -303,11 +305,14 @@ impl Stations {
         others.count() + usize::from(station.number != 0 && same.iter().any(crowded))
     }
 
-    /// A Touchdown station beside a station that is none: only ours have a session.
-    pub fn ours_beside(&self, station: Station, time_s: f64) -> Option<Station> {
-        let is_ours = |station: Station| self.peer(station).is_some_and(|peer| peer.session != 0);
-        let ours = self.peers.iter().find(|peer| peer.session != 0 && peer.is_there(time_s))?;
-        (!is_ours(station)).then(|| ours.station())
+    /// Whether a Touchdown station was received since power-up: only those have a session.
+    pub fn has_received_touchdown(&self) -> bool {
+        self.touchdown
+    }
+
+    /// Whether there is an entry of any other station.
+    pub fn has_others(&self, station: Station) -> bool {
+        self.peers.iter().any(|peer| peer.station() != station)
     }
 
     /// Age of the last sign of life of a station, s; `None` if there is none. A station with a

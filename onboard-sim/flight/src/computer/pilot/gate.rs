@@ -324,7 +324,7 @@ mod tests {
 
     /// One frame, in which the crew may abort.
     fn frame_with(pilot: &mut Pilot, table: &mut PhaseTable, input: &SensedInput, abort: bool) -> Pointed {
-        pilot.estimate_state(table.mode().phase, input, &SensorWatch::default());
+        pilot.estimate_state((table.mode().phase, false), input, &SensorWatch::default());
         fly_on(pilot, table, input, abort)
     }
 

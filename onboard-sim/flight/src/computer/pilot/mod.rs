@@ -359,7 +359,7 @@ mod tests {
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
         let mut pilot = falling();
-        pilot.estimate_state(released().mode().phase, &input(1, 0.0), &SensorWatch::default());
+        pilot.estimate_state((released().mode().phase, false), &input(1, 0.0), &SensorWatch::default());
         pilot.predict(&mut released(), &input(1, 0.0));
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);

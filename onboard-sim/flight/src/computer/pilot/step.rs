@@ -22,6 +22,9 @@ const FRAMES_PER_FAR_LOOK: u64 = 4 * FRAMES_PER_PLAN;
 /// Longest outage of the accelerometer that the estimate tolerates, s.
 const ACCELEROMETER_LOST_S: f64 = 0.5;
 
+/// Rotation below which a vehicle on the ground is at rest, rad/s.
+const STILL_RAD_S: f64 = 0.05;
+
 /// Velocity uncertainty added per frame while the force is expected instead of measured, m/s: it is
 /// off by some 0.3 m/s^2 for half a second.
 const EXPECTED_FORCE_M_S: f64 = 0.02;
@@ -41,11 +44,22 @@ fn on_the_way_up(
 
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
-    pub(crate) fn estimate_state(&mut self, phase: Phase, input: &SensedInput, sensors: &SensorWatch) {
+    pub(crate) fn estimate_state(
+        &mut self,
+        (phase, is_over): (Phase, bool),
+        input: &SensedInput,
+        sensors: &SensorWatch,
+    ) {
         // Also on the ground, where the gimbal continues to balance.
         self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
         let thrust_sensed = !(self.model.motor.burns() && sensors.accelerometer_is_lost());
-        let estimate = self.estimated(phase, input, thrust_sensed);
+        let mut estimate = self.estimated(phase, input, thrust_sensed);
+        // A vehicle may be dragged by its parachute: fixes show it, or its rotation does.
+        let turns_rad_s = (sensors.turns_rad_s() - estimate.gyro_bias_rad_s).norm();
+        if is_over && (!sensors.gnss_speaks() || turns_rad_s < STILL_RAD_S) {
+            self.estimator.take_rest();
+            estimate = self.estimator.estimate();
+        }
         self.estimate = Some(estimate);
         if thrust_sensed {
             self.update_models(phase, input, &estimate);

@@ -132,7 +132,25 @@ pub(super) fn without_last_if(ruled_out: bool, sensitivity: &[(usize, f64)]) -> 
     &sensitivity[..sensitivity.len() - usize::from(ruled_out)]
 }
 
+/// Standard deviation of the velocity of a vehicle at rest on the ground, m/s: wind rocks it.
+const AT_REST_M_S: f64 = 0.02;
+
 impl Estimator {
+    /// Corrects velocity and position of a vehicle at rest: its velocity is zero. Attitude and
+    /// biases are not changed.
+    pub(crate) fn take_rest(&mut self) {
+        for axis in 0..3 {
+            let off_m_s = -self.nominal.velocity_m_s[axis];
+            let noise = AT_REST_M_S * AT_REST_M_S;
+            let motion = |index| index < ATTITUDE;
+            if !self.correct(&[(VELOCITY + axis, 1.0)], off_m_s, noise, motion).accepted {
+                // Worse than it was assumed.
+                self.covariance.widen(VELOCITY + axis, off_m_s * off_m_s);
+                self.correct(&[(VELOCITY + axis, 1.0)], off_m_s, noise, motion);
+            }
+        }
+    }
+
     /// Corrects by one scalar with its sensitivity to each error. Errors that are not `moved` count
     /// in the variance but are not changed.
     pub(super) fn correct(

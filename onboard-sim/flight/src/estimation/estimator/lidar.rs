@@ -31,7 +31,7 @@ const AGREE_SHARE: f64 = 0.7;
 impl Estimator {
     /// Whether barometer and inertial height, both independent of the lidar, agree against its
     /// height, m.
-    fn others_contradict_m(&self, height_m: f64) -> bool {
+    pub(crate) fn others_contradict_m(&self, height_m: f64) -> bool {
         let HeightSources { inertial_m, inertial_sigma_m, barometric_m } =
             self.heights_without_lidar.sources();
         let Some(barometric_m) = barometric_m else { return false };

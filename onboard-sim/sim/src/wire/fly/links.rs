@@ -34,6 +34,8 @@ pub(super) struct Links {
     intake: Intake,
     stamps: Stamps,
     recorder: Option<Recorder>,
+    /// Failures of links that are not reported yet.
+    pub(super) down: Vec<String>,
     pub(super) tx_bytes: u64,
 }
 
@@ -97,7 +99,7 @@ impl Links {
         let key = key.map(|(file, signing)| (file, signing.with_operators(operators)));
         let links = links::Links::open(endpoints, key).await?;
         let intake = Intake { recorder: recorder.clone(), second: 0, recorded: 0, left_out: 0 };
-        Ok(Self { open: links, intake, stamps: Stamps::begin(), recorder, tx_bytes: 0 })
+        Ok(Self { open: links, intake, down: Vec::new(), stamps: Stamps::begin(), recorder, tx_bytes: 0 })
     }
 
     fn now(&self, time_s: f64) -> Now {
@@ -106,7 +108,7 @@ impl Links {
 
     pub(super) fn receive(&mut self, time_s: f64) -> Vec<Received> {
         let now = self.now(time_s);
-        let Self { open: links, intake, recorder, .. } = self;
+        let Self { open: links, intake, recorder, down, .. } = self;
         let recorder = recorder.as_ref();
         let mut received = Vec::new();
         let mut accepted = false;
@@ -132,7 +134,11 @@ impl Links {
                             note(recorder, time_s, &format!("link {name}: {words}"));
                         }
                         LinkEvent::Up(peer) => note(recorder, time_s, &format!("link {name} up: {peer}")),
-                        LinkEvent::Down(why) => note(recorder, time_s, &format!("link {name} down: {why}")),
+                        LinkEvent::Down(why) => {
+                            let words = format!("link {name} down: {why}");
+                            note(recorder, time_s, &words);
+                            down.push(words);
+                        }
                     }
                 }
             }

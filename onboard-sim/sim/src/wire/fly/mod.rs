@@ -331,6 +331,9 @@ pub async fn fly_observed(
             observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
         }
         let arrived = links.receive(vehicle.time_s());
+        for text in links.down.drain(..) {
+            observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
+        }
         for received in uplink_radio.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             receive(&mut endpoint, received, &vehicle);
         }

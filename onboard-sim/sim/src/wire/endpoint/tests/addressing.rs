@@ -128,15 +128,10 @@ fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
     for (command, param1) in MOVING {
         let request = range.programs[0].request(command, param1, 0, other);
         assert_eq!(range.request_answer(0, &request), DENIED, "{command}");
-        for nonsense in [0.75, -1.0, 16_777_216.0, f32::INFINITY] {
+        for nonsense in [0.75, -1.0, 16_777_216.0, f32::INFINITY, 0.0, f32::NAN] {
             let request = range.programs[0].request(command, param1, 0, nonsense);
             assert_eq!(range.request_answer(0, &request), DENIED, "{nonsense}");
         }
-    }
-    for boot in [BOOT as f32, 0.0, f32::NAN] {
-        let [arm, disarm] = [1.0, 0.0].map(|param1| range.programs[0].request(ARM, param1, 0, boot));
-        assert_eq!(range.request_answer(0, &arm), ACCEPTED, "{boot}");
-        assert_eq!(range.request_answer(0, &disarm), ACCEPTED);
     }
     let arm = range.programs[0].request(ARM, 1.0, 0, BOOT as f32);
     let start = range.programs[0].request(START, 0.0, 0, BOOT as f32);
@@ -156,7 +151,7 @@ fn what_moves_something_names_the_boot_it_is_for_and_what_stops_it_need_not() {
 
 #[test]
 fn with_another_vehicle_under_our_ids_a_command_must_name_its_boot() {
-    let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None)]);
+    let mut range = Range::without_operators(vec![Program::new(255, 0, 1, None)]);
     let twin = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     range.endpoint.on_frame(0, &twin, &range.vehicle.state());
     let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[0].request(ARM, 1.0, 0, boot));
@@ -171,18 +166,48 @@ fn with_another_vehicle_under_our_ids_a_command_must_name_its_boot() {
 
 /// Only a Touchdown station has a session in its heartbeats.
 #[test]
-fn a_stranger_beside_our_station_arms_only_the_boot_that_it_names() {
-    let programs = vec![Program::new(255, 7, 1, None), Program::new(254, 0, 2, None)];
-    let mut range = Range::without_operators(programs);
-    let [unnamed, named] = [0.0, BOOT as f32].map(|boot| range.programs[1].request(ARM, 1.0, 0, boot));
-    let disarm = range.programs[1].request(ARM, 0.0, 0, 0.0);
-    assert_eq!(range.request_answer(1, &unnamed), DENIED);
-    assert!(!range.vehicle.mode().interlocks.armed);
-    assert_eq!(range.request_answer(1, &named), ACCEPTED);
-    assert_eq!(range.request_answer(1, &disarm), ACCEPTED);
-    range.programs[0].speaks = false;
-    range.run(15.0);
-    assert_eq!(range.request_answer(1, &unnamed), ACCEPTED, "alone it may");
+fn a_program_without_a_session_arms_only_the_boot_that_it_names() {
+    let ours = || Program::new(255, 7, 1, None);
+    let theirs = || Program::new(254, 0, 2, None);
+    let real = VehicleEndpoint::new(VehicleKind::Real);
+    for mut range in
+        [Range::without_operators(vec![theirs(), ours()]), Range::of(rocket(), real, vec![theirs()])]
+    {
+        for (command, param1) in MOVING {
+            let unnamed = range.programs[0].request(command, param1, 0, 0.0);
+            assert_eq!(range.request_answer(0, &unnamed), DENIED, "{command}");
+        }
+        // Also when our station has left.
+        range.programs[1..].iter_mut().for_each(|ours| ours.speaks = false);
+        range.run(15.0);
+        let [unnamed, named] =
+            [f32::NAN, BOOT as f32].map(|boot| range.programs[0].request(ARM, 1.0, 0, boot));
+        assert_eq!(range.request_answer(0, &unnamed), DENIED);
+        assert!(!range.vehicle.mode().interlocks.armed);
+        assert_eq!(range.request_answer(0, &named), ACCEPTED);
+    }
+    let mut range = Range::without_operators(vec![theirs()]);
+    for boot in [BOOT as f32, 0.0, f32::NAN] {
+        let [arm, disarm] = [1.0, 0.0].map(|param1| range.programs[0].request(ARM, param1, 0, boot));
+        assert_eq!(range.request_answer(0, &arm), ACCEPTED, "{boot}");
+        assert_eq!(range.request_answer(0, &disarm), ACCEPTED);
+    }
+}
+
+#[test]
+fn the_sender_of_an_arming_a_start_or_an_abort_beside_another_station_is_reported() {
+    let mut theirs = Program::new(254, 0, 2, None);
+    theirs.path.origin = Some(Origin::Datagram(([192, 0, 2, 7], 14_550).into()));
+    let mut range = Range::without_operators(vec![Program::new(255, 7, 1, None), theirs]);
+    for (command, param1, name) in [(ARM, 1.0, "arm"), (START, 0.0, "start"), (ABORT, 1.0, "abort")] {
+        range.sent.clear();
+        let request = range.programs[1].request(command, param1, 0, BOOT as f32);
+        range.put(1, &request);
+        range.run(1.0);
+        let wanted = format!("254/190 at 192.0.2.7:14550: {name}");
+        let texts = texts(&range.sent);
+        assert!(texts.contains(&wanted), "{wanted}: {texts:?}");
+    }
 }
 
 #[test]
@@ -201,7 +226,7 @@ fn a_command_for_every_vehicle_stops_and_moves_nothing() {
     let whole = |request| CommandRequest { target: Address { system_id: 1, component_id: 0 }, ..request };
     for (command, param1) in [(HOLD, 0.0), (ARM, 0.0), (ABORT, 1.0)] {
         for (command, param1) in [(ARM, 1.0), (START, 0.0)] {
-            let request = whole(range.programs[0].request(command, param1, 0, 0.0));
+            let request = whole(range.programs[0].request(command, param1, 0, BOOT as f32));
             range.put(0, &request);
             range.frame();
         }
@@ -304,7 +329,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
                 other == program || twin.address != of.address || time_s - twin.received_at_s > 5.0
             });
             let is_received = time_s - of.received_at_s <= UPLINK_PROVEN_S;
-            let ours = boot as u32 != BOOT - 1 && !to_all;
+            let ours = boot as u32 == BOOT && !to_all;
             if alone && ours && (is_received || command != ARM) && of.by.is_some() {
                 accepted.push(Accepted { program, command, confirms, at_s: time_s });
             }

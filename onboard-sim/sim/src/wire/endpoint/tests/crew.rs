@@ -2,6 +2,7 @@
 //! and who may not.
 
 use flight::computer::crew::People;
+use protocol::command::StationHold;
 use protocol::dialect::{TD_CREW_DATA, TdAct, TdHold};
 use protocol::hub::{Hub, LinkEvent, Received};
 use protocol::signing::{Memory, Signing};
@@ -230,6 +231,24 @@ fn the_start_goes_on_while_the_confirmer_taps() {
     let held = decoded!(launch.sent, TD_FLIGHT_STATUS).last();
     assert_eq!(held.unwrap().hold, TdHold::TD_HOLD_TAP_OVERDUE);
     assert_eq!(launch.crew.clone().unwrap().held_by, 4);
+}
+
+/// Its screen or its log has failed: its operator has requested nothing.
+#[test]
+fn a_hold_that_a_station_decides_names_the_station_and_no_person() {
+    let mut launch = Launch::armed_by_two();
+    launch.propose(FLIGHT, START);
+    assert_eq!(launch.confirms(PAD, START).0, ACCEPTED);
+    let params = [0.0, StationHold::NoScreen.parameter(), 0.0];
+    let hold = any_command(&mut launch.stations[FLIGHT].encoder, HOLD, params);
+    let hold = launch.signed_for(FLIGHT, &hold);
+    launch.sent.clear();
+    launch.deliver(&hold);
+    launch.run(2.0);
+    assert!(!launch.counts_down());
+    let words = texts(&launch.sent).join("; ");
+    assert!(words.contains("holds by itself: no commanding screen") && !words.contains("Bob"), "{words}");
+    assert_eq!(launch.crew.clone().unwrap().held_by, 0);
 }
 
 /// The silence of the station that commands is watched already.

@@ -14,7 +14,7 @@ use crate::command_line::{data, refusal, replay, run};
 use crate::flown::only;
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
-use crate::tampered::{Held, Kept};
+use crate::tampered::{Held, LogMessage};
 
 /// The log of a campaign, and that of a vehicle, which begins at power-up.
 fn logs() -> [&'static Path; 2] {
@@ -28,7 +28,7 @@ fn written(held: &Held, directory: &tempfile::TempDir, name: &str) -> PathBuf {
 }
 
 /// Turns a bit of what a frame decided.
-fn tamper(message: &mut Kept) {
+fn tamper(message: &mut LogMessage) {
     let turned = |number: f64| f64::from_bits(number.to_bits() ^ 1);
     let mut frame = ComputerFrame::decode(message.data.as_slice()).unwrap();
     frame.output.fins_rad[0] = turned(frame.output.fins_rad[0]);
@@ -139,14 +139,14 @@ fn a_log_without_its_last_frames_is_not_complete() {
             whole.messages.iter().filter(|message| message.is_frame()).nth(kept).unwrap().log_time_ns;
         let mut frames_only = whole.clone();
         let mut seen = 0;
-        frames_only.keep(|message| {
+        frames_only.retain(|message| {
             seen += usize::from(message.is_frame());
             !message.is_frame() || seen <= kept
         });
         let mut everything = whole.clone();
-        everything.keep(|message| message.log_time_ns < last_ns);
+        everything.retain(|message| message.log_time_ns < last_ns);
         let mut no_verdict = whole.clone();
-        no_verdict.keep(|message| message.topic != TOPIC_VERDICT);
+        no_verdict.retain(|message| message.topic != TOPIC_VERDICT);
         for (held, name) in [(frames_only, "frames"), (everything, "all"), (no_verdict, "verdict")] {
             let path = written(&held, &directory, &format!("{name}.mcap"));
             let count = held.frames() as u64;

@@ -1,4 +1,4 @@
-//! The whole flight: its events, its mission, and what the log holds.
+//! Events, mission and contents of the log.
 
 use flight::vehicles::mission::BUILTIN;
 
@@ -9,7 +9,7 @@ use crate::log::{Clock, ClockTime};
 use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
 
-/// What `info` says of the log.
+/// The description of the log by `info`.
 pub(super) fn described(info: &Info) -> String {
     format!("<pre>{}\n</pre>\n", escaped(&info.sentences().join("\n")))
 }
