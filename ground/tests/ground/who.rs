@@ -457,7 +457,7 @@ fn an_arming_a_start_and_an_abort_by_another_station_are_alarms_with_its_address
     rig.latch = TdLatch::TD_LATCH_COMMANDED;
     rig.text("station 254/190 aborts");
     reports(&mut rig, "abort");
-    every_page(&mut rig, "ABORT LATCHED: commanded by station 254/190 at 192.0.2.7:14550");
+    every_page(&mut rig, "ABORT LATCHED: by 254/190 at 192.0.2.7:14550");
 }
 
 #[test]
