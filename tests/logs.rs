@@ -101,15 +101,15 @@ fn a_file_that_is_no_log_is_refused_by_name() {
 #[test]
 fn a_limit_of_the_file_size_ends_the_log_and_not_the_flight() {
     let folder = tempfile::tempdir().unwrap();
-    let limited = |command: &Command| {
+    let limited = |command: &Command, kib: u32| {
         let mut shell = Command::new("bash");
-        shell.args(["-c", "ulimit -f 2000; exec \"$@\"", "bash"]).arg(command.get_program());
+        shell.args(["-c", &format!("ulimit -f {kib}; exec \"$@\""), "bash"]).arg(command.get_program());
         shell.args(command.get_args()).current_dir(folder.path());
         shell
     };
     let mut flight = program(Program::OnboardSim);
     flight.args(["fly", "--start", "pad", "--seed", "3", "--speed", "max", "--log", "flight.mcap"]);
-    let flown = Running::to_end(&mut limited(&flight));
+    let flown = Running::to_end(&mut limited(&flight, 2_000));
     assert_eq!(flown.code, Some(1), "{}", flown.output);
     for words in ["its legs", "flight.mcap", "its log is incomplete"] {
         assert!(flown.output.contains(words), "{words}: {}", flown.output);
@@ -120,7 +120,7 @@ fn a_limit_of_the_file_size_ends_the_log_and_not_the_flight() {
     let link = format!("udpout:127.0.0.1:{}", vehicle.bound_port(Bound::Udp));
     let mut station = program(Program::Ground);
     station.args(["--auto", "--connect", &link, "--log", "station.mcap"]);
-    let station = Running::to_end(&mut limited(&station));
-    assert!(station.output.contains("LOG FAILED") && station.code.is_some(), "{}", station.output);
+    let station = Running::to_end(&mut limited(&station, 200));
+    assert!(station.output.contains("the log has failed") && station.code == Some(1), "{}", station.output);
     assert!(station.output.contains("its legs"), "to the end: {}", station.output);
 }

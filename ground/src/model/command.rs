@@ -348,7 +348,6 @@ pub fn overruled_by(model: &Model, why: &str, now: Duration) -> Option<Prompt> {
 pub fn why_not_start(model: &Model, now: Duration) -> Option<String> {
     why_not_reached(model, now)
         .or_else(|| (!model.vehicle.is_armed()).then(|| "not armed".to_owned()))
-        .or_else(|| model.vehicle.counts_down().then(|| "the countdown runs".to_owned()))
         .or_else(|| why_no_key(model))
         .or_else(|| why_not_in(model, |phase| phase == TdPhase::TD_PHASE_PAD_ARMED))
         .or_else(|| model.vehicle.unfit().map(|(_, words)| format!("NO-GO: {words}")))

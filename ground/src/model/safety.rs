@@ -559,10 +559,10 @@ fn abort_commanded_by(model: &Model) -> Option<String> {
     let mut texts = model.events.newest(TEXTS_SEARCHED).filter(|event| event.speaker == Speaker::Vehicle);
     let named = texts.find_map(|event| event.text.strip_suffix(" aborts"));
     let words = |sender: &str| match sender.strip_prefix("station ") {
-        Some(ids) => format!("station {}", sender_words(model, ids)),
-        None => sender.to_owned(),
+        Some(ids) => format!("by {}", sender_words(model, ids)),
+        None => format!("commanded by {sender}"),
     };
-    ours.or_else(|| named.map(|sender| format!("commanded by {}", words(sender))))
+    ours.or_else(|| named.map(words))
 }
 
 /// The ids of a station with the network address or link that the vehicle last reported for one of

@@ -88,11 +88,11 @@ const OF_STATION: [AlarmRow; 15] = [
         shares.then(|| format!("another station uses our id {system_id}/{component_id}: {what}"))
     }),
     of_boot(AlarmKind::OtherStation(CommandKind::Arm), WHO, |model, _| {
-        other_station(model).map(|which| format!("ARMED BY ANOTHER STATION: {which}"))
+        other_station(model).map(|which| format!("ARMED BY {which}, not by us"))
     }),
     of_boot(AlarmKind::OtherStation(CommandKind::Start), WHO, |model, _| {
         let which = other_station(model).filter(|_| model.vehicle.counts_down())?;
-        Some(format!("COUNTDOWN BY ANOTHER STATION: {which}; hold or abort"))
+        Some(format!("STARTED BY {which}: hold or abort"))
     }),
     of_run(AlarmKind::LinkLost, VEHICLE, |model, now| {
         let is_lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
@@ -265,8 +265,8 @@ fn battery(model: &Model) -> Option<String> {
     let battery = model.vehicle.battery()?.value;
     let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
     let empty = battery.percent.is_some_and(|percent| percent <= BATTERY_LOW_PERCENT);
-    // A charge above that limit is an estimate that the voltage contradicts.
-    let left = battery.percent.filter(|_| empty);
+    // A charge above half is an estimate that the voltage contradicts.
+    let left = battery.percent.filter(|percent| *percent <= 50);
     let left = left.map_or_else(String::new, |percent| format!(", {percent} % left"));
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
 }

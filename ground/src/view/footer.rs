@@ -241,7 +241,8 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         Act::Acknowledge => rings,
         Act::Hold => holds,
         Act::HoldCountdown => !model.is_past_hold(now),
-        Act::Arm | Act::Start | Act::Check => !away,
+        Act::Start => !away && !model.vehicle.counts_down(),
+        Act::Arm | Act::Check => !away,
         _ => true,
     };
     let works = |act: &Act| matters(act) && act.works(model, now);

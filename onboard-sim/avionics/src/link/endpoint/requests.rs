@@ -154,7 +154,10 @@ impl VehicleEndpoint {
         for (Waiting { path, command, request }, answer) in waiting.into_iter().zip(answers) {
             let link = path.link;
             self.note_commander(&request, answer, vehicle);
-            self.name_sender(path, &request, answer);
+            // Operators are identified by their keys.
+            if vehicle.input().people.is_none() {
+                self.name_sender(path, &request, answer);
+            }
             // A COMMAND_CANCEL has no parameters.
             let is_cancelled = request.command == CrewCommand::EndCheck && command.params[0].is_nan();
             let result = match commands::mav_result(answer.ending) {

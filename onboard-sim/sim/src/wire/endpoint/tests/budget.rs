@@ -185,7 +185,8 @@ fn identifies_vehicle_and_boot(kind: VehicleKind) {
         count(&first, HEARTBEAT_DATA::ID) == 1 && count(&first, TD_FLIGHT_STATUS_DATA::ID) == 1,
         "at once"
     );
-    assert_eq!(wire.request(400, 1.0, 0.0).0, 0);
+    // It names no boot.
+    assert_eq!(wire.request(ARM, 1.0, 0.0).0, if marked { ACCEPTED } else { DENIED });
     let sent = first.into_iter().chain(wire.run(5.0));
     let (mut beats, mut statuses) = (0, 0);
     for frame in sent {
