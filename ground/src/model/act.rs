@@ -251,7 +251,7 @@ impl Act {
 // The palette: every action with its key, and every number to plot; found by a part of its words.
 
 /// How to abort.
-pub const ABORT_WORDS: &str = "abort, anywhere: Enter within 2 s of Ctrl-X, or Ctrl-X twice";
+pub const ABORT_WORDS: &str = "abort, anywhere: Enter within 2 s, or Ctrl-X twice";
 
 /// What an entry of the palette does.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -31,7 +31,10 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
     let alarm = alarm_text(model, theme, now, columns).filter(|_| rings);
     // In flight nothing moves for it.
     let hidden = alarm.is_some() && model.vehicle.in_flight();
-    let message = top_lines::message(model, theme, now, columns).filter(|_| !hidden);
+    // What the alarm says in full has no second row.
+    let alarm_words = alarm.as_ref().map(ToString::to_string).unwrap_or_default();
+    let is_new = |message: &Line| !alarm_words.contains(message.to_string().trim());
+    let message = top_lines::message(model, theme, now, columns).filter(|words| !hidden && is_new(words));
     let is_flown = model.playing.is_some() || flight_began(model).is_some();
     let mut over: Vec<_> = message.into_iter().chain(alarm).collect();
     let rows = if is_flown && columns >= TWO_ROWS_COLUMNS { 2 } else { 1 };

@@ -123,21 +123,26 @@ const REPLAY: [(&str, &str); 4] = [
     ("+ -", "faster or slower"),
 ];
 
-const MARKS: &str = "~ older than 1.5 s; thick line flown, dots predicted; ▄ measured, │ asked for; on the map o is the crew. \
+const MARKS: &str = "~ older than 1.5 s; thick line flown, dots predicted; ▄ measured, │ commanded; on the map o is the crew. \
     Commanded, acknowledged and observed are three facts; armed is what HEARTBEAT says. Without link, + is the PREDICTED \
     position, its circle contains it in 19 of 20 cases. A last … is a cut line; a wider screen has more.";
 
 /// The actions whose keys do something now; those that show a page in one line.
 pub fn help_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
+    let room = columns.saturating_sub(KEY_COLUMNS + 2);
     let line = |key: String, words: &str| {
-        Line::from(vec![theme.key(format!(" {key:<KEY_COLUMNS$} ")), theme.plain(words.to_owned())])
+        let keys = std::iter::once(key).chain(std::iter::repeat(String::new()));
+        let row = |(words, key): (String, String)| {
+            Line::from(vec![theme.key(format!(" {key:<KEY_COLUMNS$} ")), theme.plain(words)])
+        };
+        lists::wrap(words, room).into_iter().zip(keys).map(row).collect::<Vec<_>>()
     };
     let mut lines = Vec::new();
     if model.settings.role.why_not_command().is_none() {
-        lines.push(line("Ctrl-X Enter".to_owned(), ABORT_WORDS));
+        lines.extend(line("Ctrl-X Enter".to_owned(), ABORT_WORDS));
     }
     if model.playing.is_some() {
-        lines.extend(REPLAY.map(|(key, words)| line(key.to_owned(), words)));
+        lines.extend(REPLAY.into_iter().flat_map(|(key, words)| line(key.to_owned(), words)));
     }
     let works = DEFINITIONS.iter().filter(|definition| definition.act.works(model, now));
     // The smallest screen has no room for every key. The palette lists these, too, and the page of
@@ -145,15 +150,14 @@ pub fn help_lines(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     let elsewhere =
         |act: Act| matches!(act, Act::Show(_) | Act::Redraw | Act::Check | Act::CheckStill | Act::RangeTest);
     for definition in works.filter(|definition| !elsewhere(definition.act)) {
-        lines.push(line(definition.act.key_name(), definition.words));
+        lines.extend(line(definition.act.key_name(), definition.words));
     }
     let pages = DEFINITIONS.iter().filter_map(|definition| match definition.act {
         Act::Show(page) => Some(format!("{}{}", definition.act.key_name(), page.name())),
         _ => None,
     });
     let pages = pages.collect::<Vec<_>>().join(" ");
-    let room = columns.saturating_sub(KEY_COLUMNS + 2);
-    lines.extend(lists::wrap(&pages, room).iter().map(|row| line("pages".to_owned(), row)));
+    lines.extend(line("pages".to_owned(), &pages));
     let marks = lists::wrap(MARKS, columns.saturating_sub(1)).into_iter();
     lines.extend(marks.map(|mark| theme.line(format!(" {mark}"), TextRole::Label)));
     lines
