@@ -25,7 +25,7 @@ const PAGES: [&str; 10] = [
 ];
 
 /// Lines that do not run here: their page, how they begin, and why.
-const ELSEWHERE: [(&str, &str, &str); 27] = [
+const ELSEWHERE: [(&str, &str, &str); 28] = [
     ("README.md", "cargo run ", "compiles; tests/demo.rs flies the same demonstration"),
     ("README.md", "cargo test", "is this test among all others"),
     ("docs/engineer.md", "npm ", "installs from the network"),
@@ -45,6 +45,7 @@ const ELSEWHERE: [(&str, &str, &str); 27] = [
     ),
     ("docs/engineer.md", "replay-rerun ", "needs the line above"),
     ("docs/engineer.md", "rerun ", "opens a window"),
+    ("docs/engineer.md", "replay import ", "needs logs of other programs; replay/tests/replay/import.rs makes some"),
     ("docs/engineer.md", "lichtblick ", "opens a window"),
     (
         "docs/build-mk3.md",

@@ -86,8 +86,8 @@ pub(crate) fn give_each<A: Answer>(
 }
 
 /// The logs of a directory, in subdirectories, too. Each regular file counts once, however many
-/// links lead to it. A name of a log that is no regular file (a pipe, a broken link) is reported and
-/// never opened.
+/// links lead to it. A name of a log that is no regular file (a pipe, a broken link) is reported
+/// and never opened.
 pub(crate) fn logs_of(directory: &Path) -> Result<Vec<PathBuf>> {
     let (mut seen, mut logs, mut left) =
         (BTreeSet::new(), Vec::new(), VecDeque::from([directory.to_owned()]));

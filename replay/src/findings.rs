@@ -21,6 +21,8 @@ pub struct Finding {
     pub lasted_s: f64,
     /// A short sentence.
     pub words: String,
+    /// An earlier finding explains it.
+    pub follows: bool,
     /// The picture of a report that shows it, by its place on the page, or another place.
     #[serde(skip)]
     pub(crate) picture: &'static str,
@@ -33,7 +35,7 @@ impl Finding {
     }
 }
 
-/// Findings of a recorded flight, first in time.
+/// Findings of a recorded flight, causes first.
 ///
 /// # Errors
 /// The reason why no findings were computed.
@@ -57,7 +59,9 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
         let serious = event.name == "vehicle" && event.level >= Level::Warning as i32;
         if serious && facts.iter().all(|known| known.words != event.message) {
             let words = event.message.clone();
-            facts.push(Finding { since_s: log_s - zero_s, clock, lasted_s: 0.0, words, picture: "events" });
+            let since_s = log_s - zero_s;
+            let follows = false;
+            facts.push(Finding { since_s, clock, lasted_s: 0.0, words, follows, picture: "events" });
         }
     }
     facts
@@ -124,13 +128,19 @@ pub(crate) fn facts(
             since_s: finding.since_s,
             clock: Clock::Flight,
             lasted_s: finding.held_s,
-            words: finding.words(),
+            words: if finding.follows {
+                format!("consequence: {}", finding.words())
+            } else {
+                finding.words()
+            },
+            follows: finding.follows,
             picture: picture(finding.sign),
         }
     }));
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings, facts.is_empty())) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        facts.push(Finding { since_s, clock: Clock::Flight, lasted_s: 0.0, words, picture: "limits" });
+        let (clock, follows) = (Clock::Flight, !facts.is_empty());
+        facts.push(Finding { since_s, clock, lasted_s: 0.0, words, follows, picture: "limits" });
     }
     Ok(facts)
 }
@@ -146,7 +156,7 @@ fn picture(sign: Sign) -> &'static str {
         | Sign::Implausible(_)
         | Sign::Repeats(_)
         | Sign::Jumps(_)
-        | Sign::Biased(_)
+        | Sign::Apart
         | Sign::HeightsDisagree
         | Sign::RangesDisagree => "test-ratio",
         Sign::Estimate => "standard-deviations",

@@ -8,7 +8,7 @@
 //!   ([`cli::Answer`]: data and text), and its line here.
 //! * [`log`]: opens a log and streams its records in bounded memory, or holds one flight.
 //! * [`info`]: describes what is in a log, how complete it is and what can be done with it.
-//! * [`findings`]: what went wrong in a flight, first in time.
+//! * [`findings`]: what went wrong in a flight, causes first.
 //! * [`controller`]: builds the flight computer that a log's frames came from.
 //! * [`verify`]: runs every frame again on its recorded input and compares the results bit for bit;
 //!   explains one, and proves the books of ground stations.
@@ -20,6 +20,7 @@
 //!   predicts the next day.
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
+//! * [`import`](mod@import): flights of other programs as logs.
 //! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a
 //!   name that is free.
@@ -34,6 +35,7 @@ pub mod evaluate;
 pub mod export;
 pub mod findings;
 pub mod fit;
+pub mod import;
 pub mod info;
 pub mod log;
 pub mod print;
@@ -127,6 +129,14 @@ enum Command {
     /// Writes a log's content as CSV; replay-rerun writes a Rerun recording.
     #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
     Export(export::Args),
+    /// Imports a flight of another program: PX4 (.ulg), ArduPilot (.bin), and .csv of AltOS,
+    /// RocketPy and OpenRocket.
+    ///
+    /// The log has position from the first sample, velocity and tilt, and the messages of
+    /// ArduPilot. `info`, `report`, `compare` and `export` use it; it has no frames of a flight
+    /// computer to run again.
+    #[command(after_help = "Example: replay import flight.ulg flight.mcap")]
+    Import(import::Args),
     /// Recovers a readable log from a damaged one, and reports what was recovered and what time
     /// span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
@@ -166,6 +176,7 @@ impl Cli {
             Command::Compare(args) => args.run(),
             Command::Report(args) => args.run(),
             Command::Export(args) => args.run(),
+            Command::Import(args) => args.run(),
             Command::Recover(args) => args.run(),
             Command::Fit(args) => args.run(),
             Command::Manual(manual) => Ok(manual.print(Self::command())?),

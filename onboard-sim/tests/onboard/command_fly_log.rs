@@ -43,18 +43,22 @@ fn fly_preserves_an_existing_log_and_reports_the_free_name() {
     assert_eq!(notes, "\u{fffd}[2J.mcap exists and is kept; \u{fffd}[2J-2.mcap is written\n");
 }
 
-/// Help for the person who types is not part of the object.
+/// Help for the person who types is not part of the object, nor is the reason why the pad is not
+/// simulated faster.
 #[test]
 fn a_line_that_is_not_understood_is_answered_beside_the_object() {
     let mut fly = Command::new(env!("CARGO_BIN_EXE_onboard-sim"));
     let station = UdpSocket::bind("127.0.0.1:0").unwrap();
     let link = format!("udpout:{}", station.local_addr().unwrap());
-    fly.args(["fly", "--json", "--mavlink", &link]);
+    fly.args(["fly", "--json", "--speed", "max", "--mavlink", &link]);
     fly.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut flying = fly.spawn().unwrap();
     writeln!(flying.stdin.as_mut().unwrap(), "pull the pin").unwrap();
     let mut lines = BufReader::new(flying.stderr.take().unwrap()).lines();
-    assert!(lines.any(|line| line.unwrap().starts_with("type `pin in`")));
+    for start in ["onboard-sim: on the pad a vehicle with a crew runs at real time, because", "type `pin in`"]
+    {
+        assert!(lines.any(|line| line.unwrap().starts_with(start)), "{start}");
+    }
     // It is running, and receives a signal.
     (0..20).for_each(|_| _ = station.recv(&mut [0; 300]).unwrap());
     let pid = rustix::process::Pid::from_child(&flying);

@@ -11,10 +11,10 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 
 /// What breaks, and the signs of which one must come first.
-const BREAKS: [(&str, &[Sign]); 18] = [
+const BREAKS: [(&str, &[Sign]); 30] = [
     ("gnss-out@5", &[Sign::Gnss]),
     ("barometer-out@coast", &[Sign::Barometer]),
-    ("barometer-step:-20@descent+1", &[Sign::HeightsDisagree]),
+    ("barometer-step:-20@descent+1", &[Sign::Jumps(2)]),
     ("lidar-out@descent", &[Sign::Lidar]),
     ("accelerometer-dead@descent", &[Sign::Repeats(0)]),
     ("fin-stuck:2@apogee", &[Sign::Surface(4)]),
@@ -30,7 +30,34 @@ const BREAKS: [(&str, &[Sign]); 18] = [
     ("weak-motor:0.8@0", &[Sign::Impulse]),
     ("early-burnout:1.5@0", &[Sign::BurntOutEarly]),
     ("reboot:0.5@descent+1", &[Sign::Restart]),
+    ("accelerometer-bias:600@descent+1", &[Sign::Jumps(0)]),
+    ("accelerometer-noise:600@descent+1", &[Sign::Jumps(0)]),
+    ("accelerometer-nan@powered+0.3", &[Sign::Implausible(0), Sign::Repeats(0)]),
+    ("gyro-bias:-20@descent+1", &[Sign::Jumps(1)]),
+    ("gyro-stuck@descent+1", &[Sign::Repeats(1), Sign::Jumps(1)]),
+    ("barometer-noise:10@descent+1", &[Sign::Jumps(2)]),
+    ("barometer-stuck@descent+1", &[Sign::Repeats(2)]),
+    ("gnss-step:50@descent+1", &[Sign::Jumps(3)]),
+    ("gnss-ramp:3@descent+1", &[Sign::Jumps(3)]),
+    ("gnss-stuck@descent+1", &[Sign::Repeats(3)]),
+    ("lidar-noise:2@descent", &[Sign::Jumps(4), Sign::RangesDisagree]),
+    ("lidar-blocked:1.5@descent", &[Sign::Repeats(4)]),
 ];
+
+/// How a surface moves that does not follow its commands.
+#[test]
+fn a_surface_that_does_not_follow_states_how_it_moves() {
+    for (fault, sign, words) in [
+        ("reversed:3@0", Sign::Surface(2), "moves the wrong way"),
+        ("swapped:36@0", Sign::Surface(2), "takes fin 4's commands"),
+        ("fin-stuck:1@apogee", Sign::Surface(3), "does not move"),
+        ("gimbal-stuck@powered+0.3", Sign::Surface(0), "does not move"),
+    ] {
+        let (_, found) = flown(&recipe("mk3", &[fault], 2001), 0, None);
+        let surface = found.iter().find(|finding| finding.sign == sign).map(Finding::words);
+        assert!(surface.as_ref().is_some_and(|text| text.contains(words)), "{fault}: {surface:?}");
+    }
+}
 
 fn recipe(mission: &str, faults: &[&str], seed: u64) -> Recipe {
     let recipe = Recipe::built_in(mission, "real").unwrap();

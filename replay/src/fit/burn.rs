@@ -95,11 +95,21 @@ const BURN_TIME: usize = 2;
 const BEGIN: usize = 3;
 const SHAPE: usize = 4;
 
+/// Thrust over that of the rows beside it beyond which a row is an outlier.
+const OUTLIER: f64 = 10.0;
+
 /// Fits a burn; times count from the ignition command.
 ///
 /// # Errors
 /// The table has too little thrust.
 pub(super) fn fit_stand(source: &str, rows: &[(f64, f64)], curve: &ThrustCurve) -> Result<Fit> {
+    for window in rows.windows(3) {
+        let [before, row, after] = window else { continue };
+        let beside_n = before.1.max(after.1).max(0.1 * curve.peak_thrust_n());
+        if row.1 > OUTLIER * beside_n {
+            bail!("{} s: thrust {} N, {beside_n:.1} N beside it: remove this row", row.0, row.1);
+        }
+    }
     let peak_n = rows.iter().map(|row| row.1).fold(f64::NEG_INFINITY, f64::max);
     let burning: Vec<usize> = (0..rows.len()).filter(|row| rows[*row].1 > 0.1 * peak_n).collect();
     let (Some(first), Some(last)) = (burning.first().copied(), burning.last().copied()) else {
@@ -235,6 +245,18 @@ mod tests {
             assert!((found.value - truth).abs() < bar, "{found:?}");
             assert!(found.low < truth && truth < found.high, "{found:?}");
         }
+    }
+
+    #[test]
+    fn a_row_of_9999_n_is_named() {
+        let curve = curve();
+        let mut rows: Vec<(f64, f64)> = (0..500)
+            .map(|row| f64::from(row) * 0.01)
+            .map(|time_s| (time_s, curve.thrust_at_n(time_s - 0.2)))
+            .collect();
+        rows[60].1 = 9_999.0;
+        let error = fit_stand("stand.csv", &rows, &curve).unwrap_err().to_string();
+        assert!(error.starts_with("0.6 s: thrust 9999 N, "), "{error}");
     }
 
     #[test]

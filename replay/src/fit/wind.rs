@@ -2,9 +2,9 @@
 //!
 //! In a fall only the air pushes sideways. Every tenth of a second the wind is solved for that
 //! makes the airframe's data, with the drag that was found along the nose, push as the
-//! accelerometer measured. The mean over the fall is that of a wind that grows by the power law, with
-//! horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one gust, and
-//! that is what makes the mean uncertain.
+//! accelerometer measured. The mean over the fall is that of a wind that grows by the power law,
+//! with horizontal gusts of MIL-F-8785C around it: a fall of 300 m meets hardly more than one gust,
+//! and that is what makes the mean uncertain.
 
 use flight::computer::FRAME_S;
 use flight::estimation::estimator::VehicleNow;

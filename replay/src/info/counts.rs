@@ -135,8 +135,8 @@ impl FrameCounter {
         self.start = true;
     }
 
-    /// Counts a frame and the records lost before it. Returns whether the computer was reset between
-    /// it and the frame before.
+    /// Counts a frame and the records lost before it. Returns whether the computer was reset
+    /// between it and the frame before.
     pub(super) fn count(&mut self, frame: u64, lost_before: u32) -> bool {
         let before = self.order.last_frame;
         let mut reset = false;

@@ -221,7 +221,7 @@ pub struct Info {
     pub highest_m: Option<f64>,
     /// How the flight ended, in one sentence, if the log has a verdict.
     pub ending: Option<String>,
-    /// What went wrong, first in time; `None` of a log whose flight this build does not run again
+    /// What went wrong, causes first; `None` of a log whose flight this build does not run again
     /// as it was.
     pub findings: Option<Vec<Finding>>,
     /// Why no findings were looked for.

@@ -1,6 +1,6 @@
 //! Writes the recovered records as a complete log.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -109,7 +109,15 @@ impl<'a> Rescue<'a> {
     /// Writes the held messages by time; where the numbers of the frames contradict their times, as
     /// they came, each at the earliest at the time of the one before it.
     fn put_in_order(&mut self) -> mcap::McapResult<()> {
-        let held = self.held.take().unwrap_or_default();
+        let mut held = self.held.take().unwrap_or_default();
+        // A start is that of a power-up if the first frame is of its time.
+        let first = |held: &&Held| held.place == Place::Frame && held.frame == Some(1);
+        let begins: BTreeSet<u64> = held.iter().filter(first).map(|held| held.header.log_time).collect();
+        for start in held.iter_mut().filter(|held| held.place == Place::Release) {
+            if begins.contains(&start.header.log_time) {
+                start.place = Place::PowerUp;
+            }
+        }
         let as_they_came: Vec<&Held> = held.iter().collect();
         let mut by_time = as_they_came.clone();
         by_time.sort_by_key(|held| (held.header.log_time, held.place));
@@ -125,11 +133,13 @@ impl<'a> Rescue<'a> {
             (as_they_came, None)
         };
         self.recovered.put_in_order = words;
-        let mut last_ns = 0;
+        let (mut last_ns, mut before_ns) = (0, None);
         for Held { header, data, .. } in order {
             let mut header = header.clone();
             if words.is_some() {
-                last_ns = header.log_time.max(last_ns);
+                // Records of one time stay so.
+                let same = before_ns.replace(header.log_time) == Some(header.log_time);
+                last_ns = if same { last_ns } else { header.log_time.max(last_ns + 1) };
                 header.log_time = last_ns;
             }
             self.writer.write_to_known_channel(&header, data)?;

@@ -1,10 +1,10 @@
 //! Writes a flight as one HTML page with its pictures inside, without network access, whole without
 //! its script.
 //!
-//! The first screen summarises the flight: verdict, findings, limits, moments, height and place. Then
-//! come burn, fall, sensors and estimator, solver, battery, link, mission, events, and how complete
-//! the log is. What the log lacks is named at the end. The script has one time for all pictures,
-//! and the vehicle at that time.
+//! The first screen summarises the flight: verdict, findings, limits, moments, height and place.
+//! Then come burn, fall, sensors and estimator, solver, battery, link, mission, events, and how
+//! complete the log is. What the log lacks is named at the end. The script has one time for all
+//! pictures, and the vehicle at that time.
 
 mod chart;
 mod html;

@@ -1,7 +1,8 @@
 //! Judges the inputs of a flight computer: some values are impossible in any flight.
 //!
 //! An input that decides nothing could be changed in a log without a divergence. A value outside
-//! the range of its sensor, or one that does not follow from the frame before it, reveals the change.
+//! the range of its sensor, or one that does not follow from the frame before it, reveals the
+//! change.
 
 use avionics::log::frame::phase_of;
 use flight::computer::{FRAME_S, flight_time_s};

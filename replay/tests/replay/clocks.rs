@@ -1,4 +1,5 @@
-//! Tests the clocks of a log: one time base in the file, and times given by the name of their clock.
+//! Tests the clocks of a log: one time base in the file, and times given by the name of their
+//! clock.
 
 use std::collections::BTreeMap;
 

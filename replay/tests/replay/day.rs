@@ -86,7 +86,10 @@ fn a_log_brings_its_mission_and_its_answer_ends_in_a_word() {
     assert!(code != 1, "{stderr}");
     assert!(stdout.ends_with(if code == 0 { "\nGO\n" } else { "\nNO-GO\n" }), "{stdout}");
     // The default prior is `real`, not the most benign one.
-    assert!(stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real\n"), "{stdout}");
+    assert!(
+        stdout.contains("prior real\n") && stdout.contains("6 simulated flights in real landed\n"),
+        "{stdout}"
+    );
     let asked = [LANDED.log.to_str().unwrap(), "--prior", "field", "--limit", "0.01"];
     let (code, stdout, stderr) = learn(&asked);
     assert!(

@@ -104,7 +104,8 @@ fn intervals_state_on_how_many_flights_they_were_calibrated() {
     assert!(calibration.own && calibration.vehicles == ["mk2"] && calibration.flights >= 100, "{flown:?}");
     assert!(flown.sentences()[1].starts_with("95 % intervals, calibrated on "), "{flown:?}");
     assert!(flown.get("thrust_scale").unwrap().systematic.is_some());
-    // The same flight of a vehicle without calibration: the widest of the others', and it is stated.
+    // The same flight of a vehicle without calibration: the widest of the others', and it is
+    // stated.
     let mission = flight::vehicle::mission::Mission { name: "ours".to_owned(), ..TRACE.mission.clone() };
     let ours = fit(&Trace { mission, ..TRACE.clone() });
     assert!(!ours.calibration.as_ref().unwrap().own);

@@ -23,6 +23,7 @@ mod from_apogee;
 mod from_power_up;
 mod ground_log;
 mod help;
+mod import;
 mod in_order;
 mod lacking;
 mod layouts;

@@ -60,7 +60,7 @@ fn the_report_states_the_verdict_first_and_then_why() {
     let mk3 = fly_recipe(&Flown::built_in("mk3", "none").unwrap());
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log, &mk3.log] {
         let page = page_of(log);
-        let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|Findings, first in time|\
+        let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|Findings, causes first|\
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
             Place from above, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
             <td>contact</td>|Inferred at the end: impulse |\
@@ -203,7 +203,7 @@ fn the_report_of_a_broken_flight_names_its_cause_first() {
         &page,
         &[
             &format!("First sign: {cause}, at T+"),
-            "Findings, first in time",
+            "Findings, causes first",
             &format!("<a href=\"#gimbal-pitch\">{cause}"),
             // What shows it stands below it, and again in its section.
             "<figure data-of=\"gimbal-pitch\"",

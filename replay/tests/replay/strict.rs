@@ -380,8 +380,8 @@ fn messages_in(held: &Held) -> Vec<(&str, u64, &[u8])> {
     messages
 }
 
-/// Every checksum of these logs is right, so that only their contents show that they are incomplete:
-/// strictly none passes, and a recovery recovers exactly the remaining messages.
+/// Every checksum of these logs is right, so that only their contents show that they are
+/// incomplete: strictly none passes, and a recovery recovers exactly the remaining messages.
 fn tamper_in_ways(cases: u32) {
     let mut runner = TestRunner::new(ProptestConfig { cases, ..ProptestConfig::default() });
     let harms = vec![

@@ -11,10 +11,12 @@ use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
 
+use nalgebra::Vector3;
+
 use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
 use super::{Computer, FRAME_S, SensedInput};
 use crate::control::servo::{GIMBALS, ServoModel};
-use crate::estimation::estimator::{Estimate, GnssFix, Health, ImuSample, Measurements};
+use crate::estimation::estimator::{Estimate, GRAVITY_M_S2, GnssFix, Health, ImuSample};
 use crate::estimation::motor_estimate::MotorStage;
 use crate::estimation::sensor_watch::{BAROMETER_LOST_S, GNSS_LOST_S, LIDAR_LOST_S, SENSORS};
 use crate::guidance::powered::ControlLevel;
@@ -35,8 +37,8 @@ pub enum Sign {
     Repeats(u8),
     /// A sensor changes by more in one sample than any motion.
     Jumps(u8),
-    /// The estimated bias of the accelerometer or the gyro is beyond its data.
-    Biased(u8),
+    /// The velocities of the inertial unit and of GNSS drift apart.
+    Apart,
     /// The barometer disagrees with the other heights.
     HeightsDisagree,
     /// The lidar disagrees with the other heights.
@@ -72,7 +74,7 @@ pub enum Sign {
 
 /// Every sign, and the time for which it must last to become a finding, s. Shorter signs are noise,
 /// a dropped sample or a gust.
-const RULES: [(Sign, f64); 39] = [
+const RULES: [(Sign, f64); 38] = [
     (Sign::Restart, 0.0),
     (Sign::Gnss, 0.0),
     (Sign::Barometer, 0.0),
@@ -89,8 +91,7 @@ const RULES: [(Sign, f64); 39] = [
     (Sign::Jumps(BAROMETER), 0.0),
     (Sign::Jumps(GNSS), 0.0),
     (Sign::Jumps(LIDAR), 0.0),
-    (Sign::Biased(ACCELEROMETER), 0.1),
-    (Sign::Biased(GYRO), 0.1),
+    (Sign::Apart, 0.0),
     (Sign::HeightsDisagree, 0.5),
     (Sign::RangesDisagree, 0.2),
     (Sign::Estimate, 0.2),
@@ -146,9 +147,11 @@ impl Finding {
             }
             Sign::Repeats(sensor) => format!("{} repeats one sample for {value:.1} s", name_of(sensor)),
             Sign::Jumps(sensor) => {
-                format!("{} jumps by {value:.1} {} in one sample", name_of(sensor), unit_of(sensor))
+                format!("{} jumps by {value:.1} {detail} in one sample", name_of(sensor))
             }
-            Sign::Biased(sensor) => format!("{} is off by {value:.1} {}", name_of(sensor), unit_of(sensor)),
+            Sign::Apart => {
+                format!("accelerometer or gyro: velocity {value:.1} m/s from GNSS in {APART_FIXES} fixes")
+            }
             Sign::RangesDisagree => format!("lidar {value:.1} m from the other heights"),
             Sign::HeightsDisagree => format!("barometer {value:.1} m from the other heights"),
             Sign::Estimate => format!("estimate unhealthy for {held_s:.1} s: {detail}"),
@@ -274,8 +277,11 @@ impl Findings {
         found.sort_by(|a, b| a.since_s.total_cmp(&b.since_s).then(a.sign.cmp(&b.sign)));
         for place in 0..found.len() {
             let at = &found[place];
-            found[place].follows =
-                found.iter().any(|other| other.since_s <= at.since_s && at.sign.follows_from(other.sign));
+            let explains = |other: &Finding| {
+                let in_time = other.since_s <= at.since_s || at.sign.of_motor() && other.sign.is_inertial();
+                in_time && at.sign.follows_from(other.sign, other.since_s < at.since_s)
+            };
+            found[place].follows = found.iter().any(explains);
         }
         found.sort_by_key(|finding| finding.follows);
         found
@@ -283,30 +289,38 @@ impl Findings {
 }
 
 impl Sign {
-    /// Whether another sign that began before explains this one.
-    fn follows_from(self, other: Self) -> bool {
-        let inertial = |sensor: u8| [ACCELEROMETER, GYRO].contains(&sensor);
-        let is_effect = |sign| {
-            matches!(sign, Self::Estimate | Self::NoPlan | Self::Tumbles | Self::Gate | Self::Biased(_))
+    /// Whether it is the motor's, whose measurement needs an intact inertial unit.
+    fn of_motor(self) -> bool {
+        matches!(self, Self::LateLight | Self::Impulse | Self::BurntOutEarly | Self::Latched)
+    }
+
+    fn is_inertial(self) -> bool {
+        use Sign::{Implausible, Jumps, Repeats};
+        matches!(
+            self,
+            Implausible(ACCELEROMETER | GYRO) | Repeats(ACCELEROMETER | GYRO) | Jumps(ACCELEROMETER | GYRO)
+        )
+    }
+
+    /// Whether another sign, which began `earlier` or in the same frame, explains this one.
+    fn follows_from(self, other: Self, earlier: bool) -> bool {
+        use Sign::{
+            Battery, Estimate, Gate, Implausible, Jumps, NoPlan, Repeats, Restart, Separation, Tumbles,
         };
+        let is_effect = |sign| matches!(sign, Estimate | NoPlan | Tumbles | Gate);
         match other {
-            // What the unit did not measure is missing in every estimate from then on.
-            Self::Restart => !matches!(self, Self::Restart | Self::Surface(_) | Self::Battery),
-            Self::Implausible(sensor) | Self::Repeats(sensor) | Self::Jumps(sensor) if inertial(sensor) => {
-                is_effect(self)
-                    || matches!(
-                        self,
-                        Self::HeightsDisagree
-                            | Self::RangesDisagree
-                            | Self::LateLight
-                            | Self::Impulse
-                            | Self::BurntOutEarly
-                            | Self::Latched
-                            | Self::AscentMotor
-                    )
+            // What the computer did not measure is missing in every estimate from then on.
+            Restart => !matches!(self, Restart | Self::Surface(_) | Battery),
+            inertial if inertial.is_inertial() => {
+                let independent =
+                    matches!(self, Restart | Battery | Separation | Implausible(_) | Repeats(_));
+                self.of_motor() || is_effect(self) || earlier && !independent
             }
-            Self::Biased(_) => is_effect(self) && !matches!(self, Self::Biased(_)),
-            other => !is_effect(other) && is_effect(self),
+            Self::Apart => is_effect(self) || self.of_motor(),
+            Self::Surface(_) | Self::SlowGimbal => {
+                is_effect(self) || self.of_motor() || matches!(self, Jumps(_) | Self::Apart)
+            }
+            other => is_effect(self) && !is_effect(other),
         }
     }
 }
@@ -320,10 +334,6 @@ const LIDAR: u8 = 4;
 
 fn name_of(sensor: u8) -> &'static str {
     SENSORS.get(usize::from(sensor)).unwrap_or(&"sensor")
-}
-
-fn unit_of(sensor: u8) -> &'static str {
-    ["m/s2", "deg/s", "m", "m", "m"].get(usize::from(sensor)).unwrap_or(&"")
 }
 
 /// The same time if the last fix came before the end of the boost, s: none of three receivers holds
@@ -364,13 +374,29 @@ const HEIGHTS_APART_M: f64 = 6.0;
 /// Height below which a plan ends, m.
 const PLANS_ABOVE_M: f64 = 2.0;
 
-/// Largest change of each sensor from one sample to the next beyond that of the estimated motion:
-/// twice the largest of 600 flights of three missions in `real` that stand.
-const JUMP: [f64; SENSORS.len()] = [20.0, 100.0, 6.0, 12.0, 2.0];
+/// Changes from one sample to the next that no motion makes: a quarter to a half more than the
+/// largest of 90 flights of three missions in `real` that stand. The gyro's in the burn is larger.
+const JUMP: [f64; SENSORS.len()] = [3.6, 8.0, 4.0, 10.0, 1.0];
+const JUMP_UNITS: [&str; SENSORS.len()] = ["m/s2", "deg/s", "m", "m", "m"];
+const GYRO_JUMP_IN_BURN_DEG_S: f64 = 20.0;
+/// Height below which legs touch the ground, m.
+const LEGS_M: f64 = 1.0;
+/// Longest time between two samples that are compared, s: inertial unit, barometer and lidar; GNSS.
+const NEXT_SAMPLE_S: f64 = 0.1;
+const NEXT_FIX_S: f64 = 0.5;
+/// Jumping ranges, each of which counts 0.9 after the next one, beyond which it is no outlier.
+const JUMPING_RANGES: f64 = 4.0;
+/// Fixes in a row at another position that are no outlier.
+const MOVED_FIXES: u32 = 3;
+/// Change of the velocity of GNSS from one fix to the next beyond that of the inertial unit, m/s;
+/// the same over this number of fixes. Largest of the same flights: 1.1 and 1.5.
+const GNSS_JUMP_M_S: f64 = 1.35;
+const APART_FIXES: usize = 4;
+const APART_M_S: f64 = 2.0;
+/// Number of frames for which the inertial velocity is stored: a fix is not older.
+const HISTORY: usize = 64;
 /// Time without a plausible inertial sample, s.
 const IMPLAUSIBLE_S: f64 = 0.02;
-/// Largest estimated bias of a working accelerometer, m/s^2, and of a gyro, deg/s.
-const BIASED: [f64; 2] = [1.0, 4.0];
 /// Number of deviating frames from which on a surface's motion is explained, and the share of the
 /// deviation that the explanation leaves.
 const EXPLAINED_FRAMES: u32 = 12;
@@ -416,56 +442,163 @@ impl Motion {
         let width_rad = self.span_rad.map_or(0.0, |[low, high]| high - low);
         let is_held = width_rad < 0.5 * AWAY_RAD[usize::from(own >= GIMBALS)];
         let [towards_rad, all_rad] = self.turned_rad;
-        best.or(is_held.then_some(HELD))
-            .or((towards_rad > 0.8 * all_rad).then_some(LAGS))
-            .map_or("", |place| FOLLOWS[place])
+        let held = is_held.then_some(HELD);
+        held.or(best).or((towards_rad > 0.8 * all_rad).then_some(LAGS)).map_or("", |place| FOLLOWS[place])
     }
 }
 
-/// The last sample of each sensor, with its time, s.
-#[derive(Debug, Clone, Copy, Default)]
-struct LastSamples {
+/// Steps of the sensors that the estimated motion does not explain.
+#[derive(Debug, Clone)]
+struct Steps {
     imu: Option<ImuSample>,
+    /// Changes of the last three inertial samples, the newest last: across the nose, m/s^2, where
+    /// no motor acts, and the rotation, deg/s.
+    changes: [[f64; 5]; 3],
     pressure_m: Option<(f64, f64)>,
-    fix: Option<GnssFix>,
     range_m: Option<(f64, f64)>,
+    jumping_ranges: f64,
+    /// Velocity gained by the inertial unit since the first frame, m/s; the same of the last
+    /// frames.
+    gained_m_s: Vector3<f64>,
+    history_m_s: [Vector3<f64>; HISTORY],
+    fix: Option<(GnssFix, Vector3<f64>)>,
+    /// Sum of the motion of the fixes beyond their velocities, m, which is forgotten.
+    moved_m: Vector3<f64>,
+    moved_fixes: u32,
+    /// Changes of the velocity of GNSS beyond that of the inertial unit, m/s, the newest last, and
+    /// the times of their fixes, s.
+    apart_m_s: [Vector3<f64>; APART_FIXES],
+    fixed_at_s: [f64; APART_FIXES],
+    /// Frames taken.
+    frames: usize,
+    /// Step of each sensor in this frame, with its time, s, and unit; and that of [`Sign::Apart`].
+    found: [Option<(f64, f64, &'static str)>; SENSORS.len() + 1],
 }
 
-impl LastSamples {
-    /// Takes a frame's measurements. Returns the change of each sensor beyond that of the estimated
-    /// motion, with its sign, in its unit.
-    fn take(&mut self, measured: &Measurements, estimate: &Estimate, time_s: f64) -> [f64; SENSORS.len()] {
-        let mut jumps = [0.0; SENSORS.len()];
+impl Default for Steps {
+    fn default() -> Self {
+        let zero = Vector3::zeros();
+        Self {
+            imu: None,
+            changes: [[0.0; 5]; 3],
+            pressure_m: None,
+            range_m: None,
+            jumping_ranges: 0.0,
+            gained_m_s: zero,
+            history_m_s: [zero; HISTORY],
+            fix: None,
+            moved_m: zero,
+            moved_fixes: 0,
+            apart_m_s: [zero; APART_FIXES],
+            fixed_at_s: [0.0; APART_FIXES],
+            frames: 0,
+            found: [None; SENSORS.len() + 1],
+        }
+    }
+}
+
+impl Steps {
+    /// Takes a frame. Steps of an ascent are not counted: shocks and a coarse attitude make some.
+    fn take(&mut self, flown: &SensedInput, estimate: &Estimate, phase: Phase, sees_ground: bool) {
+        let (measured, time_s) = (&flown.measured, flown.time_s);
         let climb_m_s = estimate.state.velocity_m_s.z;
-        let largest =
-            |values: &[f64]| values.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
+        self.found = [None; SENSORS.len() + 1];
+        let mut find = |sensor: usize, step: f64, at_s: f64| {
+            self.found[sensor] = (step.abs() > JUMP[sensor]).then_some((step, at_s, JUMP_UNITS[sensor]));
+        };
+        let force_m_s2 = measured.imu.specific_force_m_s2;
         if let Some(before) = self.imu.replace(measured.imu) {
-            // The force along the nose changes at once with each motor and charge.
-            let force_m_s2 = measured.imu.specific_force_m_s2 - before.specific_force_m_s2;
-            jumps[0] = largest(&[force_m_s2.y, force_m_s2.z]);
-            let turn_rad_s: [f64; 3] = (measured.imu.gyro_rad_s - before.gyro_rad_s).into();
-            jumps[1] = largest(&turn_rad_s).to_degrees();
+            let force = force_m_s2 - before.specific_force_m_s2;
+            let turn = (measured.imu.gyro_rad_s - before.gyro_rad_s).map(f64::to_degrees);
+            self.changes.rotate_left(1);
+            self.changes[2] = [force.y, force.z, turn.x, turn.y, turn.z].map(f64::abs);
+            let [before, now, after] = self.changes;
+            // A motion goes on; a step is alone.
+            let alone: [f64; 5] =
+                core::array::from_fn(|axis| (now[axis] - before[axis] - after[axis]).max(0.0));
+            find(usize::from(ACCELEROMETER), alone[0].max(alone[1]), time_s - FRAME_S);
+            let turned = alone[2].max(alone[3]).max(alone[4]);
+            if !phase.in_landing_burn() || turned > GYRO_JUMP_IN_BURN_DEG_S {
+                find(usize::from(GYRO), turned, time_s - FRAME_S);
+            }
         }
+        let step = |last: &mut Option<(f64, f64)>, now_m: f64, rate_m_s: f64| {
+            let (before_m, before_s) = last.replace((now_m, time_s))?;
+            let passed_s = time_s - before_s;
+            (passed_s < NEXT_SAMPLE_S).then_some(now_m - before_m - rate_m_s * passed_s)
+        };
         if let Some(now_m) = measured.pressure_altitude_m
-            && let Some((before_m, before_s)) = self.pressure_m.replace((now_m, time_s))
+            && let Some(jump_m) = step(&mut self.pressure_m, now_m, climb_m_s)
         {
-            jumps[2] = now_m - before_m - climb_m_s * (time_s - before_s);
+            find(usize::from(BAROMETER), jump_m, time_s);
         }
-        if let Some(fix) = measured.gnss
-            && let Some(before) = self.fix.replace(fix)
+        if let Some(now_m) = measured.lidar_range_m.filter(|_| sees_ground)
+            && let Some(jump_m) = step(&mut self.range_m, now_m, climb_m_s / estimate.state.nose_in_world().z)
         {
-            let moved_m =
-                (fix.velocity_m_s + before.velocity_m_s) * (0.5 * (fix.valid_at_s - before.valid_at_s));
-            jumps[3] = (fix.position_m - before.position_m - moved_m).norm();
+            let jumps = jump_m.abs() > JUMP[usize::from(LIDAR)];
+            self.jumping_ranges = 0.9 * self.jumping_ranges + f64::from(u8::from(jumps));
+            if self.jumping_ranges > JUMPING_RANGES {
+                find(usize::from(LIDAR), jump_m, time_s);
+            }
         }
-        let nose_up = estimate.state.nose_in_world().z;
-        if let Some(now_m) = measured.lidar_range_m
-            && let Some((before_m, before_s)) = self.range_m.replace((now_m, time_s))
-            && nose_up > LIDAR_COS_TILT
-        {
-            jumps[4] = now_m - before_m - climb_m_s / nose_up * (time_s - before_s);
+        if !measured.imu.is_plausible() {
+            // What was gained is unknown: the fixes begin again.
+            self.frames = 0;
+            return;
         }
-        jumps
+        self.gained_m_s +=
+            (estimate.state.world_from_body * force_m_s2 - Vector3::z() * GRAVITY_M_S2) * FRAME_S;
+        self.history_m_s.rotate_left(1);
+        self.history_m_s[HISTORY - 1] = self.gained_m_s;
+        self.frames += 1;
+        if let Some(fix) = measured.gnss {
+            self.take_fix(fix, time_s);
+        }
+        if !(phase.in_descent() || phase.in_landing_burn()) {
+            self.found = [None; SENSORS.len() + 1];
+            (self.moved_m, self.apart_m_s) = (Vector3::zeros(), [Vector3::zeros(); APART_FIXES]);
+        }
+    }
+
+    fn take_fix(&mut self, fix: GnssFix, time_s: f64) {
+        let frames = libm::round((time_s - fix.valid_at_s) / FRAME_S).max(0.0) as usize;
+        let repeats = self.fix.is_some_and(|(before, _)| before.position_m == fix.position_m);
+        if frames >= self.frames.min(HISTORY) || repeats {
+            (self.fix, self.fixed_at_s) = (None, [0.0; APART_FIXES]);
+            return;
+        }
+        let gained_m_s = self.history_m_s[HISTORY - 1 - frames];
+        let Some((before, before_m_s)) = self.fix.replace((fix, gained_m_s)) else { return };
+        let passed_s = fix.valid_at_s - before.valid_at_s;
+        if !(0.0..NEXT_FIX_S).contains(&passed_s) || passed_s <= 0.0 {
+            return;
+        }
+        let mean_m_s = 0.5 * (fix.velocity_m_s + before.velocity_m_s);
+        self.moved_m = 0.9 * self.moved_m + fix.position_m - before.position_m - mean_m_s * passed_s;
+        let moved_m = self.moved_m.norm();
+        self.moved_fixes = if moved_m > JUMP[usize::from(GNSS)] { self.moved_fixes + 1 } else { 0 };
+        self.apart_m_s.rotate_left(1);
+        self.fixed_at_s.rotate_left(1);
+        let last = APART_FIXES - 1;
+        self.apart_m_s[last] = fix.velocity_m_s - before.velocity_m_s - (gained_m_s - before_m_s);
+        self.fixed_at_s[last] = time_s;
+        // Steps at once, and goes on: the inertial unit. Steps once: GNSS.
+        let [_, first, second, third] = &self.apart_m_s;
+        let goes_on = |next: &Vector3<f64>| next.dot(first) > 0.5 * first.norm_squared();
+        let (gnss, apart) = (usize::from(GNSS), SENSORS.len());
+        if first.norm() > GNSS_JUMP_M_S && self.fixed_at_s[1] > 0.0 {
+            let of = if goes_on(second) && goes_on(third) { apart } else { gnss };
+            self.found[of] = Some((first.norm(), self.fixed_at_s[1], "m/s"));
+        }
+        if self.moved_fixes >= MOVED_FIXES {
+            self.found[gnss] = Some((moved_m, self.fixed_at_s[last + 1 - MOVED_FIXES as usize], "m"));
+        }
+        let sum_m_s = self.apart_m_s.iter().sum::<Vector3<f64>>().norm();
+        let largest_m_s = self.apart_m_s.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let all = self.fixed_at_s[0] > 0.0;
+        if all && sum_m_s > APART_M_S && largest_m_s < 0.5 * sum_m_s {
+            self.found[apart] = Some((sum_m_s, self.fixed_at_s[1], "m/s"));
+        }
     }
 }
 
@@ -481,9 +614,7 @@ struct Watcher {
     pressure_m: Option<f64>,
     surfaces: [ServoModel; SURFACES],
     motions: [Motion; SURFACES],
-    last: LastSamples,
-    /// Changes of the sensors in this frame.
-    jumps: [f64; SENSORS.len()],
+    steps: Steps,
     /// Gimbal angles in the frame before, rad.
     gimbal_rad: [f64; 2],
     /// In the burn: the number of frames in which each axis had to turn fast, and the largest turn
@@ -513,8 +644,7 @@ impl Watcher {
             pressure_m: None,
             surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
             motions: [Motion::default(); SURFACES],
-            last: LastSamples::default(),
-            jumps: [0.0; SENSORS.len()],
+            steps: Steps::default(),
             gimbal_rad: flown.gimbal_rad,
             turns: [(0, 0.0); 2],
             boost_m_s: 0.0,
@@ -535,9 +665,8 @@ impl Watcher {
             let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
             self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
             self.gimbal_rad = flown.gimbal_rad;
-            self.last = LastSamples::default();
+            self.steps = Steps::default();
         }
-        self.jumps = self.last.take(&flown.measured, estimate, time_s);
         self.pressure_m = flown.measured.pressure_altitude_m.or(self.pressure_m);
         if flown.measured.gnss.is_some() {
             self.gnss_since_boost = phase != Phase::Boost;
@@ -572,6 +701,7 @@ impl Watcher {
         self.down |= flown.contact && !phase.before_apogee();
         self.astray |= phase.in_landing_burn() && nose_up < ASTRAY_COS_TILT;
         self.must_see_s = if near { self.must_see_s.or(Some(time_s)) } else { None };
+        self.steps.take(flown, estimate, phase, near);
     }
 
     /// Compares surfaces that do not follow their commands with what would explain it.
@@ -669,24 +799,19 @@ fn seen_in_flight(
             let [_, repeats_s] = computer.sensors().lost_s()[usize::from(sensor)];
             (repeats_s > 0.0).then(|| seen(time_s - repeats_s, repeats_s, 0.0, ""))
         }
+        Sign::Jumps(_) | Sign::Apart if height_m < LEGS_M => None,
         Sign::Jumps(sensor) => {
-            let jump = watcher.jumps[usize::from(sensor)];
-            (jump.abs() > JUMP[usize::from(sensor)]).then(|| Hit { size: jump.abs(), ..now(jump, 0.0) })
+            let (jump, at_s, unit) = watcher.steps.found[usize::from(sensor)]?;
+            Some(Hit { size: jump.abs(), ..seen(at_s, jump, 0.0, unit) })
         }
-        Sign::Biased(sensor) => {
-            let bias = if sensor == GYRO {
-                estimate.gyro_bias_rad_s.map(f64::to_degrees)
-            } else {
-                estimate.accelerometer_bias_m_s2
-            };
-            let bias = bias.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-            (bias.abs() > BIASED[usize::from(sensor)]).then(|| Hit { size: bias.abs(), ..now(bias, 0.0) })
+        Sign::Apart => {
+            let (apart_m_s, at_s, _) = watcher.steps.found[SENSORS.len()]?;
+            Some(seen(at_s, apart_m_s, 0.0, ""))
         }
         Sign::RangesDisagree => {
-            let nose_up = estimate.state.nose_in_world().z;
-            let range_height_m = flown.measured.lidar_range_m.unwrap_or(watcher.last.range_m?.0) * nose_up;
-            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
-            (falls && nose_up > LIDAR_COS_TILT && pilot.estimator().others_contradict_m(range_height_m))
+            let (range_m, measured_s) = watcher.steps.range_m.filter(|_| watcher.must_see_s.is_some())?;
+            let range_height_m = range_m * estimate.state.nose_in_world().z;
+            (time_s - measured_s < NEXT_SAMPLE_S && pilot.estimator().others_contradict_m(range_height_m))
                 .then(|| now((range_height_m - height_m).abs(), 0.0))
         }
         Sign::HeightsDisagree => {

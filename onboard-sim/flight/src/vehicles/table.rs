@@ -83,7 +83,7 @@ pub fn rows<'a, const N: usize>(
     let (separator, names, places, number) = header.ok_or_else(|| {
         let wanted = wanted[..needed].iter().map(|(name, _)| *name).collect::<Vec<_>>().join(" and ");
         let required =
-            format!("a line that names {wanted}, each with its unit, as time_s or Time (s), is needed");
+            format!("a line that names {wanted}, each with its unit, as time_s or Time (s), separated by , ; or tab, is needed");
         TableError::bad(1, "the header", text.lines().next().unwrap_or_default(), &required)
     })?;
     let mut factors = [1.0; N];
@@ -94,6 +94,11 @@ pub fn rows<'a, const N: usize>(
     let is_data = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with(['#', '%', '/']);
     Ok(lines.filter(move |(line, _)| is_data(line)).map(move |(line, number)| {
         let fields: Vec<_> = line.split(separator).collect();
+        if fields.iter().rposition(|field| !field.trim().is_empty()) >= Some(names.len()) {
+            let required =
+                format!("{} columns as in the header; with decimal commas ; separates", names.len());
+            return Err(TableError::bad(number, "the row", line, &required));
+        }
         let mut row = [None; N];
         for (k, (column, _)) in wanted.iter().enumerate() {
             let field = places[k].and_then(|place| fields.get(place)).map_or("", |field| field.trim());
@@ -166,12 +171,16 @@ mod tests {
         for (text, wrong) in [
             (
                 "t,f\n1,2\n",
-                "line 1: the header is 't,f'; a line that names time and thrust, each with its unit, as time_s or Time (s), is needed",
+                "line 1: the header is 't,f'; a line that names time and thrust, each with its unit, as time_s or Time (s), separated by , ; or tab, is needed",
             ),
             ("time_s,thrust_kg\n", "line 1: thrust is 'kg'; a unit of n, kn, lbf, kgf, gf is accepted"),
             ("time,thrust\n", "line 1: time is ''; a unit of s, ms, min is accepted"),
             ("time_s,thrust_n\n0,1\n1,x\n", "line 3: thrust is 'x'; a finite number is accepted"),
             ("time_s,thrust_n\n0,1\n1\n", "line 3: thrust is ''; a finite number is accepted"),
+            (
+                "time_s,thrust_n\n0,0,1,5\n",
+                "line 2: the row is '0,0,1,5'; 2 columns as in the header; with decimal commas ; separates",
+            ),
         ] {
             assert_eq!(read(text).unwrap_err().to_string(), wrong);
         }

@@ -51,6 +51,9 @@ fn an_airframe_may_contain_the_text_of_its_motor_file() {
         <eng-data t="2.1" f="0"/></data></engine></engine-list></engine-database>"#;
     let curve = named(rocksim).expect("a valid motor");
     assert!((curve.total_impulse_n_s() - 20.0).abs() < 1e-9, "{}", curve.total_impulse_n_s());
+    assert_eq!(named(&rocksim.replace("dia=", "Itot=\"19\" dia=")), named(rocksim));
+    let refused = named(&rocksim.replace("dia=", "Itot=\"200\" dia=")).expect_err("ten times the points");
+    assert!(refused.to_string().contains("Itot is '200'; half to twice the impulse"), "{refused}");
     let refused = named("<engine-database>\n</engine-database>").expect_err("no motor in it");
     assert!(refused.to_string().contains("of the airframe"), "{refused}");
     assert!(named("H4").expect_err("no such motor").to_string().contains("H45W"));

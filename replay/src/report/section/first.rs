@@ -65,7 +65,7 @@ fn verdict(flight: &Flight, info: &Info) -> String {
 
 /// The findings, numbered as in the pictures, and below them the picture that shows the first.
 fn findings(info: &Info, drawn: &[Drawn]) -> String {
-    let mut html = "<h3 id=\"findings\">Findings, first in time</h3>\n".to_owned();
+    let mut html = "<h3 id=\"findings\">Findings, causes first</h3>\n".to_owned();
     let Some(findings) = &info.findings else {
         return html + &paragraph(&info.no_findings());
     };

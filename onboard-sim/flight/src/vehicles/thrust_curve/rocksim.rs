@@ -30,6 +30,16 @@ pub(super) fn parse(text: &str) -> Result<(MotorData, usize), ThrustCurveError> 
     for point in engine.descendants().filter(|node| node.has_tag_name("eng-data")) {
         push_point(&mut points, line_of(&point), attribute(&point, "t")?, attribute(&point, "f")?)?;
     }
+    let impulse_n_s: f64 = points
+        .windows(2)
+        .map(|at| 0.5 * (at[0].thrust_n + at[1].thrust_n) * (at[1].time_s - at[0].time_s))
+        .sum();
+    if let Some(stated) = engine.attribute("Itot") {
+        let stated_n_s = not_negative(line, "Itot", stated)?;
+        if !(0.5..=2.0).contains(&(stated_n_s / impulse_n_s)) && stated_n_s > 0.0 {
+            return Err(bad(line, "Itot", stated, "half to twice the impulse of the points is accepted"));
+        }
+    }
     let data = MotorData {
         name: attribute(&engine, "code")?.to_owned(),
         manufacturer: engine.attribute("mfg").unwrap_or_default().to_owned(),

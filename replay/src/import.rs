@@ -1,0 +1,288 @@
+//! Imports a flight of another program as telemetry: PX4 (`.ulg`), ArduPilot (`.bin`), and CSV of
+//! AltOS, RocketPy and OpenRocket.
+//!
+//! The log that it writes describes the flight as a ground station would have recorded it: position
+//! from the first sample, velocity and tilt. It has no frames of a flight computer, so nothing of
+//! it can be run again. The nose is the body's x axis.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, bail, ensure};
+use ardupilot_binlog::Reader;
+use flight::computer::messages::Severity;
+use flight::rules::phase::Phase;
+use protocol::log::record::Record;
+use protocol::log::v1::Telemetry;
+use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::motion::Degrees;
+use protocol::program::Exit;
+use px4_ulog::full_parser::{MultiId, SomeVec, read_file};
+use serde::Serialize;
+use sim::wire::record::text_event;
+
+use crate::cli::{Answer, give, print_note};
+use crate::output::NewFile;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The flight: .ulg, .bin or .csv.
+    file: PathBuf,
+    /// The log to write.
+    output: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<Exit> {
+        give(&import(&self.file, &self.output)?, self.json)
+    }
+}
+
+/// A log that was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Imported {
+    pub output: PathBuf,
+    /// Format of the flight.
+    pub format: &'static str,
+    pub samples: usize,
+    pub lasted_s: f64,
+    /// Signals that the file does not have.
+    pub missing: Vec<&'static str>,
+}
+
+impl Answer for Imported {
+    fn sentences(&self) -> Vec<String> {
+        let Self { output, format, samples, lasted_s, missing } = self;
+        let missing = if missing.is_empty() { "nothing".to_owned() } else { missing.join(", ") };
+        vec![format!(
+            "{}: {samples} samples over {lasted_s:.1} s from {format}; missing: {missing}",
+            output.display()
+        )]
+    }
+}
+
+/// A signal of a sample.
+type Value = fn(&Telemetry) -> Option<f64>;
+
+/// Samples and texts of a flight, with their times, s.
+#[derive(Default)]
+struct Track {
+    samples: Vec<Telemetry>,
+    texts: Vec<(f64, String)>,
+}
+
+/// Imports a flight.
+///
+/// # Errors
+/// The file cannot be read, is of no known format or has no position, or the log cannot be written.
+pub fn import(file: &Path, output: &Path) -> Result<Imported> {
+    let name = file.display();
+    let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
+    let (format, track) = match ending.as_ref().and_then(|ending| ending.to_str()) {
+        Some("ulg") => ("PX4", px4(file)),
+        Some("bin") => ("ArduPilot", ardupilot(file)),
+        Some("csv") => ("CSV", table(file)),
+        _ => bail!("{name}: .ulg, .bin and .csv are accepted"),
+    };
+    let Track { mut samples, texts } = track.with_context(|| name.to_string())?;
+    samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let first = samples.first().with_context(|| format!("{name}: no sample with a position"))?.clone();
+    for sample in &mut samples {
+        sample.time_s -= first.time_s;
+        for (value, origin) in [
+            (&mut sample.north_m, first.north_m),
+            (&mut sample.east_m, first.east_m),
+            (&mut sample.altitude_m, first.altitude_m),
+        ] {
+            *value = value.zip(origin).map(|(value, origin)| value - origin);
+        }
+    }
+    let signals: [(&str, Value); 5] = [
+        ("altitude", |sample| sample.altitude_m),
+        ("position", |sample| sample.north_m),
+        ("climb", |sample| sample.climb_m_s),
+        ("horizontal velocity", |sample| sample.north_m_s),
+        ("tilt", |sample| sample.tilt_rad),
+    ];
+    let lacks = |(_, value): &&(&str, Value)| samples.iter().all(|sample| value(sample).is_none());
+    let missing = signals.iter().filter(lacks).map(|(name, _)| *name).collect();
+    let lasted_s = samples.last().map_or(0.0, |last| last.time_s);
+    let run = [("imported", name.to_string()), ("format", format.to_owned())];
+    let header = LogHeader {
+        writer: "replay import".to_owned(),
+        run: run.map(|(key, value)| (key.to_owned(), value)).into(),
+        ..LogHeader::default()
+    };
+    let count = samples.len();
+    let sampled = samples.into_iter().map(|sample| (sample.time_s, Record::Telemetry(Box::new(sample))));
+    let texts = texts.iter().map(|(time_s, text)| (time_s - first.time_s, text_event(Severity::Info, text)));
+    let mut records: Vec<(f64, Record)> = sampled.chain(texts).collect();
+    records.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut writer = LogWriter::new(BufWriter::new(NewFile::create(output)?), &header)?;
+    for (time_s, record) in &records {
+        writer.write(record, (time_s.max(0.0) * 1e9) as u64)?;
+    }
+    let output = writer.finish()?.into_inner().map_err(|error| error.into_error())?.commit()?;
+    Ok(Imported { output, format, samples: count, lasted_s, missing })
+}
+
+/// The local position, with the attitude before each sample.
+fn px4(file: &Path) -> Result<Track> {
+    let parsed = read_file(file.to_str().context("its name is not UTF-8")?)?;
+    if parsed.completeness.is_incomplete() {
+        print_note(&format!("warning: {} is damaged: {:?}", file.display(), parsed.completeness));
+    }
+    let column = |topic: &str, name: &str| -> Result<Vec<f64>> {
+        let fields = parsed.messages.get(topic).and_then(|instances| instances.get(&MultiId::new(0)));
+        Ok(match fields.and_then(|fields| fields.get(name)) {
+            Some(SomeVec::Float(values)) => values.iter().map(|value| f64::from(*value)).collect(),
+            Some(SomeVec::UInt64(values)) => values.iter().map(|value| *value as f64 / 1e6).collect(),
+            _ => bail!("no {name} of {topic}"),
+        })
+    };
+    let [times_s, x, y, z, vx, vy, vz] =
+        ["timestamp", "x", "y", "z", "vx", "vy", "vz"].map(|name| column("vehicle_local_position", name));
+    let (times_s, position, velocity) = (times_s?, [x?, y?, z?], [vx?, vy?, vz?]);
+    let turned =
+        ["timestamp", "q[0]", "q[1]", "q[2]", "q[3]"].map(|name| column("vehicle_attitude", name).ok());
+    let tilt_rad = |time_s: f64| {
+        let [Some(times_s), Some(w), Some(x), Some(y), Some(z)] = &turned else { return None };
+        let place = times_s.partition_point(|at_s| *at_s <= time_s).checked_sub(1)?;
+        // The height of the nose over its length, north-east-down.
+        let up = 2.0 * (w.get(place)? * y.get(place)? - x.get(place)? * z.get(place)?);
+        Some(libm::acos(up.clamp(-1.0, 1.0)))
+    };
+    let sample = |(row, time_s): (usize, f64)| {
+        let [north_m, east_m, down_m] = position.each_ref().map(|values| values.get(row).copied());
+        let [north_m_s, east_m_s, down_m_s] = velocity.each_ref().map(|values| values.get(row).copied());
+        Telemetry {
+            time_s,
+            north_m,
+            east_m,
+            altitude_m: down_m.map(|down_m| -down_m),
+            north_m_s,
+            east_m_s,
+            climb_m_s: down_m_s.map(|down_m_s| -down_m_s),
+            tilt_rad: tilt_rad(time_s),
+            ..Telemetry::default()
+        }
+    };
+    Ok(Track { samples: times_s.into_iter().enumerate().map(sample).collect(), texts: Vec::new() })
+}
+
+/// The state of the first estimator, and the messages.
+fn ardupilot(file: &Path) -> Result<Track> {
+    let mut track = Track::default();
+    for entry in Reader::new(File::open(file)?) {
+        let entry = entry?;
+        let time_s = entry.timestamp_usec.unwrap_or_default() as f64 / 1e6;
+        let value = |name: &str| entry.get_f64(name);
+        match entry.name.as_str() {
+            "XKF1" | "NKF1" if value("C").unwrap_or(0.0) <= 0.0 => track.samples.push(Telemetry {
+                time_s,
+                north_m: value("PN"),
+                east_m: value("PE"),
+                altitude_m: value("PD").map(|down_m| -down_m),
+                north_m_s: value("VN"),
+                east_m_s: value("VE"),
+                climb_m_s: value("VD").map(|down_m_s| -down_m_s),
+                tilt_rad: value("Pitch").map(|pitch_deg| (90.0 - pitch_deg).to_radians()),
+                ..Telemetry::default()
+            }),
+            "MSG" => track.texts.extend(entry.get_str("Message").map(|text| (time_s, text.to_owned()))),
+            _ => {}
+        }
+    }
+    ensure!(!track.samples.is_empty(), "no XKF1 or NKF1, the estimator's state");
+    Ok(track)
+}
+
+/// The names of a column in its programs, the first that is there, and the signal that it sets.
+type Column = (&'static [&'static str], fn(&mut Telemetry, f64));
+
+const COLUMNS: [Column; 8] = [
+    (&["time", "time (s)"], |sample, value| sample.time_s = value),
+    (&["height", "altitude agl (m)", "altitude (m)", "z (m)"], |sample, value| {
+        sample.altitude_m = Some(value)
+    }),
+    (&["x (m)", "position east of launch (m)"], |sample, value| sample.east_m = Some(value)),
+    (&["y (m)", "position north of launch (m)"], |sample, value| sample.north_m = Some(value)),
+    (&["vx (m/s)"], |sample, value| sample.east_m_s = Some(value)),
+    (&["vy (m/s)"], |sample, value| sample.north_m_s = Some(value)),
+    (&["vz (m/s)", "vertical velocity (m/s)", "speed", "accel_speed"], |sample, value| {
+        sample.climb_m_s = Some(value);
+    }),
+    (&["attitude angle (\u{b0})", "vertical orientation (zenith) (\u{b0})"], |sample, value| {
+        sample.tilt_rad = Some((90.0 - value).to_radians());
+    }),
+];
+
+/// The phase of a state of AltOS.
+fn phase_of(state: &str) -> Option<u32> {
+    let phase = match state {
+        "pad" => Phase::PadArmed,
+        "boost" => Phase::Boost,
+        "fast" | "coast" => Phase::Coast,
+        "drogue" | "main" => Phase::Chute,
+        "landed" => Phase::Touchdown,
+        _ => return None,
+    };
+    Some(phase as u32)
+}
+
+fn table(file: &Path) -> Result<Track> {
+    let rows = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .from_path(file)?
+        .into_records();
+    let mut heads: Vec<String> = Vec::new();
+    let mut samples = Vec::new();
+    let mut pad = None;
+    for row in rows {
+        let row = row?;
+        let line = row.position().map_or(0, csv::Position::line);
+        let first = row.get(0).unwrap_or_default();
+        if heads.is_empty() || first.starts_with('#') {
+            let names: Vec<String> = row
+                .iter()
+                .map(|name| name.trim_start_matches(['#', ' ', '\u{feff}']).to_lowercase())
+                .collect();
+            if COLUMNS[0].0.iter().any(|time| names.iter().any(|name| name == time)) {
+                heads = names;
+            }
+            continue;
+        }
+        let cell = |name: &str| row.get(heads.iter().position(|head| head == name)?);
+        let mut sample = Telemetry::default();
+        for (names, set) in COLUMNS {
+            let Some((name, text)) = names.iter().find_map(|name| Some((name, cell(name)?))) else {
+                continue;
+            };
+            let value: f64 =
+                text.parse().with_context(|| format!("line {line}, {name}: {text}: not a number"))?;
+            if value.is_finite() {
+                set(&mut sample, value);
+            }
+        }
+        sample.phase = cell("state_name").and_then(phase_of);
+        let degrees = |name: &str| cell(name)?.parse().ok().filter(|degrees: &f64| degrees.abs() > 0.0);
+        if let Some((latitude, longitude)) = degrees("latitude").zip(degrees("longitude")) {
+            let here = Degrees { latitude, longitude };
+            let (north_m, east_m) = pad.get_or_insert(here).to(here);
+            (sample.north_m, sample.east_m) = (Some(north_m), Some(east_m));
+        }
+        samples.push(sample);
+    }
+    ensure!(!heads.is_empty(), "no line has the head of a column of times: `time` or `Time (s)`");
+    ensure!(
+        samples.iter().any(|sample| sample.altitude_m.is_some()),
+        "no column of heights: `height`, `Altitude (m)` or `Z (m)`"
+    );
+    Ok(Track { samples, texts: Vec::new() })
+}

@@ -1,0 +1,164 @@
+//! Tests imports of flights of other programs, each from a file as its format's description has it.
+
+use std::path::Path;
+
+use replay::import::import;
+use replay::info::{GradeLevel, info};
+use replay::log::Recording;
+use replay::report::report;
+
+const TIMES: std::ops::Range<u16> = 0..40;
+
+/// Height of a flight of 4 s to 30 m, m.
+fn height_m(step: u16) -> f64 {
+    let time_s = f64::from(step) / 10.0;
+    30.0 - 7.5 * (time_s - 2.0) * (time_s - 2.0)
+}
+
+/// Writes the file, imports it, and checks what all of them must have.
+fn imported(name: &str, bytes: &[u8]) -> (Recording, Vec<&'static str>) {
+    let directory = tempfile::tempdir().unwrap();
+    let (file, log) = (directory.path().join(name), directory.path().join("log.mcap"));
+    std::fs::write(&file, bytes).unwrap();
+    let imported = import(&file, &log).unwrap();
+    assert_eq!((imported.samples, imported.output.as_path()), (TIMES.len(), log.as_path()));
+    let found = info(&log).unwrap();
+    assert_eq!(found.grade.level, GradeLevel::TelemetryOnly, "{name}");
+    assert!((found.highest_m.unwrap() - 30.0).abs() < 0.01, "{name}: {:?}", found.highest_m);
+    assert!(report(&log).unwrap().html.contains("<svg"), "{name}");
+    (Recording::open(&log).unwrap(), imported.missing)
+}
+
+#[test]
+fn val_hand_an_altos_file() {
+    let mut text =
+        "#version,serial,flight,call,time,clock,rssi,lqi,state,state_name,pressure,altitude,height,speed,connected,latitude,longitude,altitude\n"
+            .to_owned();
+    for step in TIMES {
+        let (state, height) = (if step < 20 { "boost" } else { "main" }, height_m(step));
+        let north_deg = 35.0 + f64::from(step) * 1e-5;
+        text += &format!(
+            "5,1,2,N0CALL,{:8.2},0,0,0,1,{state:>8},900,1300,{height:8.2},{:8.2},1,{north_deg:.7},-117.0,1300\n",
+            f64::from(step) / 10.0,
+            15.0 - 1.5 * f64::from(step),
+        );
+    }
+    let (flight, missing) = imported("altos.csv", text.as_bytes());
+    assert_eq!(missing, ["horizontal velocity", "tilt"]);
+    let last = flight.telemetry.last().unwrap();
+    // A degree of latitude is 110.94 km there.
+    assert!((last.north_m.unwrap() - 39.0 * 1.1094).abs() < 0.02, "{last:?}");
+    assert!(last.east_m.unwrap().abs() < 1e-6 && flight.telemetry[0].phase != last.phase);
+}
+
+#[test]
+fn val_hand_a_rocketpy_file() {
+    let mut text =
+        "# Time (s),X (m),Y (m),Z (m),Vx (m/s),Vy (m/s),Vz (m/s),Attitude Angle (\u{b0})\n".to_owned();
+    for step in TIMES {
+        let time_s = f64::from(step) / 10.0;
+        text +=
+            &format!("{time_s:.6},{time_s:.6},{:.6},{:.6},1,2,0,80\n", 2.0 * time_s, 1400.0 + height_m(step));
+    }
+    let (flight, missing) = imported("rocketpy.csv", text.as_bytes());
+    assert!(missing.is_empty(), "{missing:?}");
+    let last = flight.telemetry.last().unwrap();
+    assert!((last.east_m.unwrap() - 3.9).abs() < 1e-6 && (last.north_m.unwrap() - 7.8).abs() < 1e-6);
+    assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-9);
+}
+
+#[test]
+fn val_hand_an_ardupilot_file() {
+    let padded = |text: &str, length: usize| {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes.resize(length, 0);
+        bytes
+    };
+    let mut file = Vec::new();
+    let mut format = |number: u8, length: u8, name: &str, types: &str, labels: &str| {
+        file.extend([0xa3, 0x95, 0x80, number, length]);
+        file.extend([padded(name, 4), padded(types, 16), padded(labels, 64)].concat());
+    };
+    format(0x80, 89, "FMT", "BBnNZ", "Type,Length,Name,Format,Columns");
+    format(10, 3 + 8 + 1 + 2 + 24, "XKF1", "QBcffffff", "TimeUS,C,Pitch,VN,VE,VD,PN,PE,PD");
+    format(11, 3 + 8 + 64, "MSG", "QZ", "TimeUS,Message");
+    file.extend(
+        [[0xa3, 0x95, 11].as_slice(), &500_000_u64.to_le_bytes(), &padded("Throttle armed", 64)].concat(),
+    );
+    for step in TIMES {
+        for core in [0_u8, 1] {
+            file.extend([0xa3, 0x95, 10]);
+            file.extend((u64::from(step) * 100_000).to_le_bytes());
+            file.push(core);
+            file.extend(8_000_i16.to_le_bytes());
+            for value in [1.0, 2.0, 3.0, 4.0, 5.0, -height_m(step) as f32] {
+                file.extend(value.to_le_bytes());
+            }
+        }
+    }
+    let (flight, missing) = imported("00000042.BIN", &file);
+    assert!(missing.is_empty(), "{missing:?}");
+    let last = flight.telemetry.last().unwrap();
+    assert!((last.climb_m_s, last.north_m) == (Some(-3.0), Some(0.0)), "{last:?}");
+    assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-6);
+    assert!(
+        flight
+            .events
+            .iter()
+            .any(|(at_s, event)| (at_s - 0.5).abs() < 1e-6 && event.message == "Throttle armed")
+    );
+}
+
+#[test]
+fn val_hand_a_px4_file() {
+    let mut file = b"ULog\x01\x12\x35\x01".to_vec();
+    file.extend([0; 8]);
+    let mut message = |kind: u8, body: &[u8]| {
+        file.extend(u16::try_from(body.len()).unwrap().to_le_bytes());
+        file.push(kind);
+        file.extend(body);
+    };
+    message(b'B', &[0; 40]);
+    message(
+        b'F',
+        b"vehicle_local_position:uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;",
+    );
+    message(b'F', b"vehicle_attitude:uint64_t timestamp;float[4] q;");
+    message(b'A', b"\0\x01\0vehicle_local_position");
+    message(b'A', b"\0\x02\0vehicle_attitude");
+    // The nose turned up by 80 degrees about the body's y axis.
+    let (half_sin, half_cos) = (40f32.to_radians().sin(), 40f32.to_radians().cos());
+    for step in TIMES {
+        let mut record = |number: u16, values: &[f32]| {
+            let mut body = number.to_le_bytes().to_vec();
+            body.extend((1_000_000 + u64::from(step) * 100_000).to_le_bytes());
+            body.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            message(b'D', &body);
+        };
+        record(2, &[half_cos, 0.0, half_sin, 0.0]);
+        record(1, &[7.0, 8.0, -height_m(step) as f32, 1.0, 2.0, 3.0]);
+    }
+    let (flight, missing) = imported("flight.ulg", &file);
+    assert!(missing.is_empty(), "{missing:?}");
+    let last = flight.telemetry.last().unwrap();
+    assert!((last.climb_m_s, last.north_m) == (Some(-3.0), Some(0.0)), "{last:?}");
+    assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-3, "{last:?}");
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, bytes, wrong) in [
+        ("a.bag", b"".as_slice(), "a.bag: .ulg, .bin and .csv are accepted"),
+        ("a.csv", b"a,b\n1,2\n", "`time` or `Time (s)`"),
+        ("b.csv", b"time,speed\n1,2\n", "no column of heights"),
+        ("c.csv", b"time,height\n1,x\n", "line 2, height: x: not a number"),
+        ("a.bin", b"nothing of it", "no XKF1 or NKF1"),
+        ("a.ulg", b"nothing of it", "a.ulg"),
+    ] {
+        let file = directory.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let error = format!("{:#}", import(&file, Path::new("/nonexistent/log.mcap")).unwrap_err());
+        assert!(error.contains(wrong) && error.contains(name), "{name}: {error}");
+    }
+}
