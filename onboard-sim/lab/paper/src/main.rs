@@ -24,7 +24,7 @@ struct Arguments {
     /// Instead of the tables, the verdict on each printed final state, as docs/paper.md has it.
     #[arg(long, conflicts_with = "stability")]
     verdicts: bool,
-    /// Instead of the tables, the fins' forces in simulated falls: by Eq. 9-14, as the world has them,
+    /// Instead of the tables, the fins' forces in simulated falls: by Eq. 9-14, as in the world,
     /// and the one along Y_f that the paper drops.
     #[arg(long, conflicts_with_all = ["stability", "verdicts", "out"])]
     fins: bool,

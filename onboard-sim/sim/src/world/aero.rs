@@ -361,9 +361,9 @@ mod tests {
         from_fn(|i| if i == fin { sine } else { 0.0 })
     }
 
-    /// Eq. 13 and 14: at 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and 5.504 N
-    /// of lift; half of each at 30 degrees. In a wind from the side the drag turns with it and keeps
-    /// its size, where Eq. 13 would halve it at 60 degrees.
+    /// Eq. 13 and 14: at 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and
+    /// 5.504 N of lift; half of each at 30 degrees. In a wind from the side the drag turns with it
+    /// and keeps its size, where Eq. 13 would halve it at 60 degrees.
     #[test]
     fn val_hand_drag_and_lift() {
         let nominal = Truth::default();

@@ -166,8 +166,8 @@ pub(super) fn all() -> Vec<Case> {
 type Deviation = (&'static str, f64, fn(f64) -> Case);
 
 /// How far each value of the start may be from nominal, on either side, for the paper's plan to end
-/// inside Table 2, the others nominal: name, the paper's largest, ours and its step. The search ends
-/// at the first step that misses.
+/// inside Table 2, the others nominal: name, the paper's largest, ours and its step. The search
+/// ends at the first step that misses.
 pub(super) fn ranges() -> [(&'static str, f64, f64, f64); 3] {
     const MOST_STEPS: u32 = 60;
     let deviations: [(Deviation, f64); 3] = [

@@ -153,6 +153,9 @@ fn quantiles(samples: &[Instant], of: impl Fn(&Instant) -> f64) -> [f64; 2] {
     if values.is_empty() { [f64::NAN; 2] } else { [at(0.5), at(0.95)] }
 }
 
+/// A value of an instant.
+type Value = fn(&Instant) -> f64;
+
 /// Flies the falls and writes the table.
 ///
 /// # Errors
@@ -173,7 +176,6 @@ pub(crate) fn write_fins(out: &mut impl Write) -> Result<(), PaperError> {
         let falls = falls.into_iter().collect::<Result<Vec<_>, _>>()?;
         columns.push(falls.concat());
     }
-    type Value = fn(&Instant) -> f64;
     let rows: [(&str, Value); 8] = [
         ("largest opening less the smallest, deg", |i| i.spread_rad.to_degrees()),
         ("tail to the wind, deg", |i| i.incidence_rad.to_degrees()),
@@ -185,14 +187,12 @@ pub(crate) fn write_fins(out: &mut impl Write) -> Result<(), PaperError> {
         ("Eq. 9-14 less turned into the wind, force, share", |i| i.printed_off_n / i.turned_n.max(1e-9)),
     ];
     for (name, of) in rows {
-        let cells: String = columns
-            .iter()
-            .map(|samples| {
-                let [median, high] = quantiles(samples, of);
-                format!("{:>18}", format!("{median:.2} {high:.2}"))
-            })
-            .collect();
-        writeln!(out, "{name:<52}{cells}")?;
+        write!(out, "{name:<52}")?;
+        for samples in &columns {
+            let [median, high] = quantiles(samples, of);
+            write!(out, "{:>18}", format!("{median:.2} {high:.2}"))?;
+        }
+        writeln!(out)?;
     }
     let apart = columns.iter().map(|samples| {
         let wide = samples.iter().filter(|instant| instant.spread_rad > 15_f64.to_radians()).count();
