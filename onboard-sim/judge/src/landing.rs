@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, SVector, Vector3};
 use num_dual::{DualNum, DualNumCopy, HyperDual64};
-use ocp::landing::{INPUTS, Problem, STATES};
+use ocp::landing::{INPUTS, Problem, STATES, Weights};
 
 /// States and inputs of a node, one after the other.
 pub(crate) const BOTH: usize = STATES + INPUTS;
@@ -109,9 +109,9 @@ pub(crate) fn cost_at(problem: &Problem, k: usize) -> (Node, Node) {
     let Problem { weights, step_s, target_m: [x_m, y_m], .. } = problem;
     let mut weight = Node::zeros();
     if k > 0 {
-        let of_leans = [weights.lean, weights.lean, weights.rate, weights.rate];
-        weight.fixed_rows_mut::<4>(6).copy_from_slice(&of_leans);
-        weight.fixed_rows_mut::<2>(0).fill(weights.place);
+        let Weights { place, height, velocity: [level, vertical], lean, rate, .. } = *weights;
+        let of_states = [place, place, height, level, level, vertical, lean, lean, rate, rate];
+        weight.fixed_rows_mut::<STATES>(0).copy_from_slice(&of_states);
     }
     if k < problem.pushes.len() {
         weight.fixed_rows_mut::<INPUTS>(STATES).copy_from_slice(&[

@@ -84,6 +84,8 @@ pub struct Mismatch {
     pub body_drag_share: f64,
     /// Drag of the fins, as a fraction.
     pub fin_drag_share: f64,
+    /// Force of a fin away from the axis, over its drag times the cosine of its opening.
+    pub fin_radial: [f64; 2],
     /// Drag across the body, as a fraction.
     pub crossflow_share: f64,
     /// Drag of the legs, as a fraction of the airframe's.

@@ -221,6 +221,7 @@ fn mismatch(truth: &mut Truth, mission: &Mission, sigma: &Mismatch, seed: u64, n
     truth.inertia_split = (sigma.inertia_split_share * chance.normal()).clamp(-0.3, 0.3);
     truth.other_curve = chance.between(sigma.other_curve);
     truth.ignition_delay_s -= sigma.ignition_tail_s * libm::log(1.0 - chance.unit());
+    truth.fin_radial = chance.between(sigma.fin_radial);
 }
 
 /// Fractions of a delay, uniform in [0, 1), for the faults of flight `number`. They come from a

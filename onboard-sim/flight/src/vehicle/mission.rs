@@ -142,6 +142,15 @@ pub struct PlanWeights {
     /// Distance from the landing point, 1/m^2.
     #[serde(default)]
     pub x: f64,
+    /// Height, 1/m^2.
+    #[serde(default)]
+    pub z: f64,
+    /// Vertical velocity, s^2/m^2: the paper's is along the body.
+    #[serde(default)]
+    pub u: f64,
+    /// Velocity in each level direction, s^2/m^2: the paper's is across the body.
+    #[serde(default)]
+    pub w: f64,
     /// Leans, 1/rad^2.
     pub theta: f64,
     /// Rates of the leans, s^2/rad^2.

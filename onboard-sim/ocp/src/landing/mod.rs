@@ -122,6 +122,10 @@ pub struct End {
 pub struct Weights {
     /// Of the distance from the target, 1/m^2.
     pub place: f64,
+    /// Of the height, 1/m^2.
+    pub height: f64,
+    /// Of the level and of the vertical velocity, s^2/m^2.
+    pub velocity: [f64; 2],
     /// Of the leans, 1/rad^2.
     pub lean: f64,
     /// Of the rates, s^2/rad^2.
@@ -238,8 +242,8 @@ pub fn last_multipliers(
 impl Problem {
     fn state_weights(&self) -> State {
         let Self { weights, step_s, .. } = self;
-        let [place, lean, rate] = [weights.place, weights.lean, weights.rate].map(|weight| weight * step_s);
-        [place, place, 0.0, 0.0, 0.0, 0.0, lean, lean, rate, rate]
+        let Weights { place, height, velocity: [level, vertical], lean, rate, .. } = *weights;
+        [place, place, height, level, level, vertical, lean, lean, rate, rate].map(|weight| weight * step_s)
     }
 
     fn deviation(&self, state: &State) -> State {

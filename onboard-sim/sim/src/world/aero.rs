@@ -35,6 +35,7 @@ pub(crate) struct Shape {
     strip_area_m2: f64,
     strip_stations_m: [f64; STRIPS],
     fins: FinModel,
+    fin_radial: f64,
     fin_station_m: f64,
     /// Directions from the axis to the fins, in body axes.
     fin_directions: [Vector3<f64>; 4],
@@ -139,6 +140,7 @@ impl Shape {
                 * truth.crossflow_scale,
             strip_stations_m: from_fn(|i| strip_m * (i as f64 + 0.5)),
             fins,
+            fin_radial: truth.fin_radial,
             fin_station_m: airframe.fins.station_m,
             fin_directions: from_fn(|i| Vector3::from([0.0, fins.outward(i)[0], fins.outward(i)[1]])),
             nose_station_m: body.length_m,
@@ -237,10 +239,18 @@ impl Shape {
             from_fn(|i| (x_m_s[i] * x_m_s[i] + y_m_s[i] * y_m_s[i] + z_m_s[i] * z_m_s[i]).sqrt());
         let along: Each = from_fn(|i| along[i] * speed_m_s[i]);
         let across: Each = from_fn(|i| across[i] * speed_m_s[i]);
+        let radial = -fin * self.fin_radial * self.fins.drag_coefficient;
+        let away: Each = from_fn(|i| {
+            let sine = fin_sines[i % 4];
+            let cosine = (1.0 - sine * sine).max(0.0).sqrt();
+            if i < 4 { 0.0 } else { radial * sine * cosine * speed_m_s[i] * x_m_s[i] }
+        });
         let x_n: Each =
             from_fn(|i| x_m_s[i] * along[i] + (y_m_s[i] * z_out[i] - z_m_s[i] * y_out[i]) * across[i]);
-        let y_n: Each = from_fn(|i| y_m_s[i] * along[i] - x_m_s[i] * z_out[i] * across[i]);
-        let z_n: Each = from_fn(|i| z_m_s[i] * along[i] + x_m_s[i] * y_out[i] * across[i]);
+        let y_n: Each =
+            from_fn(|i| y_m_s[i] * along[i] - x_m_s[i] * z_out[i] * across[i] + y_out[i] * away[i]);
+        let z_n: Each =
+            from_fn(|i| z_m_s[i] * along[i] + x_m_s[i] * y_out[i] * across[i] + z_out[i] * away[i]);
         let sum = |each: Each| {
             let pairs: [f64; 4] = from_fn(|i| each[i] + each[i + 4]);
             (pairs[0] + pairs[2]) + (pairs[1] + pairs[3])
@@ -312,6 +322,98 @@ impl Parachute {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The paper's fins on mk2 (section 2.1 and Eq. 2).
+    fn paper_fins() -> Airframe {
+        let mut airframe = flight::vehicles::mission::builtin_airframe("mk2").unwrap();
+        (airframe.body.reference_area_m2, airframe.body.diameter_m) = (0.0043, 0.074);
+        let fins = &mut airframe.fins;
+        (fins.drag_coefficient, fins.lift_coefficient, fins.length_m) = (1.55, 1.28, 0.10);
+        airframe
+    }
+
+    /// What the fins at these sines add at 1,000 Pa, the wind at an angle to the axis in the x-z
+    /// plane, about a point on the axis `arm_m` behind the hinges, nearer to the tail.
+    fn by_fins(truth: &Truth, fin_sines: [f64; 4], angle_deg: f64, arm_m: f64) -> Load {
+        let airframe = paper_fins();
+        let shape = Shape::new(&airframe, truth);
+        let (sin, cos) = libm::sincos(angle_deg.to_radians());
+        let flow = Flow {
+            density_kg_m3: 2.0,
+            velocity_m_s: Vector3::new(-cos, 0.0, sin) * libm::sqrt(1000.0),
+            rate_rad_s: Vector3::zeros(),
+        };
+        let at = |fin_sines| {
+            let configuration = Configuration {
+                fin_sines,
+                legs_out: false,
+                parachute_area_m2: 0.0,
+                plume: Plume { body: 1.0, fins: 1.0 },
+                cg_m: Vector3::new(airframe.fins.station_m - arm_m, 0.0, 0.0),
+            };
+            shape.load(&flow, &configuration)
+        };
+        let (with, without) = (at(fin_sines), at([0.0; 4]));
+        Load { force_n: with.force_n - without.force_n, moment_n_m: with.moment_n_m - without.moment_n_m }
+    }
+
+    fn alone(fin: usize, sine: f64) -> [f64; 4] {
+        from_fn(|i| if i == fin { sine } else { 0.0 })
+    }
+
+    /// Eq. 13 and 14: at 1,000 Pa an open fin has 0.0043 x 1.55 x 1000 = 6.665 N of drag and
+    /// 5.504 N of lift; half of each at 30 degrees. In a wind from the side the drag turns with it
+    /// and keeps its size, where Eq. 13 would halve it at 60 degrees.
+    #[test]
+    fn val_hand_drag_and_lift() {
+        let nominal = Truth::default();
+        for fin in 0..4 {
+            for (sine, drag_n, lift_n) in [(1.0, 6.665, 5.504), (0.5, 3.3325, 2.752)] {
+                let force_n = by_fins(&nominal, alone(fin, sine), 0.0, 0.0).force_n;
+                assert!((force_n.x - drag_n).abs() < 1e-9, "{force_n}");
+                assert!((libm::hypot(force_n.y, force_n.z) - lift_n).abs() < 1e-9, "{force_n}");
+            }
+        }
+        // Of four equal fins the lifts cancel.
+        let force_n = by_fins(&nominal, [1.0; 4], 60.0, 0.0).force_n;
+        let against = Vector3::new(0.5, 0.0, -libm::sin(60_f64.to_radians()));
+        assert!((force_n - against * (4.0 * 6.665)).norm() < 1e-9, "{force_n}");
+    }
+
+    /// Eq. 15 to 17: the hand values of the allocation's test of the same name, in the world.
+    #[test]
+    fn val_hand_moments_of_one_fin() {
+        for fin in 0..4 {
+            let moment_n_m = by_fins(&Truth::default(), alone(fin, 1.0), 0.0, 0.0).moment_n_m;
+            let expected = Vector3::new(
+                ROLL[fin] * 0.478_848,
+                flight::vehicle::fins::PITCH[fin] * 0.289_927_5,
+                flight::vehicle::fins::YAW[fin] * 0.502_169_160_532,
+            );
+            assert!((moment_n_m - expected).norm() < 1e-9, "{moment_n_m}");
+        }
+    }
+
+    /// A half of the drag's 6.665 sin 45 N times cos 45: 0.5 x 3.3325 N away from the axis,
+    /// 0.23 m from the centre of gravity. None on an open fin, and none on four equal ones.
+    #[test]
+    fn val_hand_force_of_a_fin_away_from_the_axis() {
+        let radial = Truth { fin_radial: 0.5, ..Truth::default() };
+        let sine = libm::sqrt(0.5);
+        let added = |fins, angle_deg, arm_m| {
+            let [with, without] =
+                [&radial, &Truth::default()].map(|truth| by_fins(truth, fins, angle_deg, arm_m));
+            (with.force_n - without.force_n, with.moment_n_m - without.moment_n_m)
+        };
+        for fin in 0..4 {
+            let (force_n, moment_n_m) = added(alone(fin, sine), 0.0, 0.23);
+            let outward = Shape::new(&paper_fins(), &radial).fin_directions[fin];
+            assert!((force_n - outward * (0.5 * 3.3325)).norm() < 1e-9, "{force_n}");
+            assert!((moment_n_m - (Vector3::x() * 0.23).cross(&force_n)).norm() < 1e-9, "{moment_n_m}");
+            assert!(added(alone(fin, 1.0), 20.0, 0.23).0.norm() < 1e-9);
+        }
+        assert!(added([sine; 4], 0.0, 0.23).0.norm() < 1e-9);
+    }
 
     /// Contribution of legs of 0.01 m2 at 30 m/s from the tail, 20 degrees from the side, and in a
     /// roll.

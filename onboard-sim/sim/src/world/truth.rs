@@ -64,6 +64,8 @@ flight::with_defaults! {
         pub body_drag_scale: f64 = 1.0,
         pub fin_drag_scale: f64 = 1.0,
         pub crossflow_scale: f64 = 1.0,
+        /// Force of a fin away from the axis, over its drag times the cosine of its opening.
+        pub fin_radial: f64 = 0.0,
         /// Drag area of the legs beside the airframe's, m^2.
         pub leg_drag_m2: f64 = 0.0,
         /// True moments of inertia over those of the data, beside `mass_scale`.

@@ -213,6 +213,8 @@ fn posed(situation: &PoweredSituation<'_>, settings: &PoweredSettings, state: &R
         target_m: [0.0; 2],
         weights: Weights {
             place: settings.weights.x,
+            height: settings.weights.z,
+            velocity: [settings.weights.w, settings.weights.u],
             lean: settings.weights.theta,
             rate: settings.weights.q,
             gimbal: settings.weights.delta,

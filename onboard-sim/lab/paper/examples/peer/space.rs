@@ -115,7 +115,15 @@ fn landing(terminal_penalty: f64) -> Problem {
         wind_m_s: [2.0, 0.5],
         gravity_m_s2: GRAVITY_M_S2,
         target_m: [0.0, 0.0],
-        weights: Weights { place: 1.0, lean: 1000.0, rate: 0.0, gimbal: 20_000.0, fins: 20.0 },
+        weights: Weights {
+            place: 1.0,
+            height: 0.0,
+            velocity: [0.0; 2],
+            lean: 1000.0,
+            rate: 0.0,
+            gimbal: 20_000.0,
+            fins: 20.0,
+        },
         gimbal_limit_rad: 4.5_f64.to_radians(),
         lean_max_rad: 50.0_f64.to_radians(),
         end: End {

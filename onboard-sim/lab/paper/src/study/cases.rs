@@ -162,6 +162,30 @@ pub(super) fn all() -> Vec<Case> {
     ]
 }
 
+/// A deviation from the nominal start: its name, its step, and the case with it.
+type Deviation = (&'static str, f64, fn(f64) -> Case);
+
+/// How far each value of the start may be from nominal, on either side, for the paper's plan to end
+/// inside Table 2, the others nominal: name, the paper's largest, ours and its step. The search
+/// ends at the first step that misses.
+pub(super) fn ranges() -> [(&'static str, f64, f64, f64); 3] {
+    const MOST_STEPS: u32 = 60;
+    let deviations: [(Deviation, f64); 3] = [
+        (("pitch, deg", 2.5, |off| Case { pitch_deg: 90.0 + off, ..NOMINAL }), 30.0),
+        (("w, m/s", 0.25, |off| Case { w_m_s: off, ..NOMINAL }), 1.0),
+        (("q, deg/s", 5.0, |off| Case { pitch_rate_deg_s: off, ..NOMINAL }), 5.0),
+    ];
+    deviations.map(|((name, step, case), printed)| {
+        let lands = |off: f64| {
+            let solution = paper::plane::solve(&case(off).problem(), None);
+            solution.converged() && broken(&solution.end()).is_empty()
+        };
+        let steps = (1..=MOST_STEPS).map(f64::from);
+        let most = steps.take_while(|count| lands(count * step) && lands(-count * step)).last();
+        (name, printed, most.unwrap_or(0.0) * step, step)
+    })
+}
+
 /// The limits of Table 2 that a final state breaks, in words; none means that it lands.
 pub(super) fn broken(state: &PlanarState) -> Vec<String> {
     let end = Touchdown {
@@ -173,6 +197,58 @@ pub(super) fn broken(state: &PlanarState) -> Vec<String> {
         rate_rad_s: state.q_rad_s.abs(),
     };
     LandingVerdict::judge_plan(&TABLE_2, &end).failures().map(LimitResult::to_string).collect()
+}
+
+/// What became of a printed final state, by the key of docs/paper.md.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// Every value agrees with the printed one.
+    Reproduced,
+    /// Some value differs; both meet Table 2.
+    InsideTheSameLimits,
+    /// The printed values miss Table 2, ours meet it.
+    Improved,
+    /// Ours miss Table 2.
+    Missed,
+    /// The paper prints no final state.
+    NotPrinted,
+}
+
+/// Largest difference between two values that agree, as a share of their limit in Table 2.
+const AGREES_WITHIN: f64 = 0.1;
+
+impl Verdict {
+    /// The verdict from a printed final state and ours.
+    pub(crate) fn of(printed: Option<&PaperRow>, ours: &PlanarState) -> Self {
+        let Some(printed) = printed.map(PaperRow::state) else { return Self::NotPrinted };
+        let agrees = [
+            (printed.x_m - ours.x_m, TABLE_2.distance_m),
+            (printed.z_m - ours.z_m, TABLE_2.height_m),
+            (printed.theta_rad - ours.theta_rad, TABLE_2.tilt_rad),
+            (printed.u_m_s - ours.u_m_s, TABLE_2.vertical_m_s),
+            (printed.w_m_s - ours.w_m_s, TABLE_2.lateral_m_s),
+            (printed.q_rad_s - ours.q_rad_s, TABLE_2.rate_rad_s),
+        ]
+        .iter()
+        .all(|(difference, limit)| difference.abs() <= AGREES_WITHIN * limit);
+        match (broken(&printed).is_empty(), broken(ours).is_empty()) {
+            (_, false) => Self::Missed,
+            _ if agrees => Self::Reproduced,
+            (true, true) => Self::InsideTheSameLimits,
+            (false, true) => Self::Improved,
+        }
+    }
+
+    /// For tables and the page.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Reproduced => "reproduced",
+            Self::InsideTheSameLimits => "inside the same limits",
+            Self::Improved => "improved",
+            Self::Missed => "missed",
+            Self::NotPrinted => "not printed",
+        }
+    }
 }
 
 #[cfg(test)]
@@ -196,6 +272,34 @@ mod tests {
         for (name, x_m, pitch_deg, u_m_s, w_m_s, rate_deg_s, lands) in rows {
             let broken = broken(&row(x_m, 0.0, pitch_deg, u_m_s, w_m_s, rate_deg_s).state());
             assert_eq!(broken.is_empty(), lands, "{name}: {broken:?}");
+        }
+    }
+
+    /// The paper's ranges lie well inside ours.
+    #[test]
+    fn val_landing_paper_ranges_of_the_start_are_exceeded() {
+        for (name, printed, ours, _) in ranges() {
+            assert!(ours > printed, "{name}: {ours}, the paper {printed}");
+        }
+    }
+
+    /// Agreement needs every value; a plan that misses Table 2 is never better than "missed".
+    #[test]
+    fn a_verdict_follows_from_the_numbers() {
+        let inside = row(0.4, 0.0, 90.0, 0.1, 0.0, 0.0);
+        let near = PlanarState { x_m: 2.3, u_m_s: 0.13, ..inside.state() };
+        let off = PlanarState { q_rad_s: 0.3_f64.to_radians(), ..near };
+        let outside = row(0.4, 0.0, 90.0, 0.48, 0.0, 0.0);
+        let hard = PlanarState { u_m_s: -0.41, ..near };
+        for (printed, ours, expected) in [
+            (Some(&inside), near, Verdict::Reproduced),
+            (Some(&inside), off, Verdict::InsideTheSameLimits),
+            (Some(&outside), near, Verdict::Improved),
+            (Some(&outside), hard, Verdict::Missed),
+            (Some(&inside), hard, Verdict::Missed),
+            (None, near, Verdict::NotPrinted),
+        ] {
+            assert_eq!(Verdict::of(printed, &ours), expected, "{printed:?} {ours:?}");
         }
     }
 

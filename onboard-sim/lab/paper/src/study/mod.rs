@@ -8,12 +8,14 @@
 //!
 //! * [`Objective`]: Table 3's J under every definition that the paper leaves open.
 //! * [`figures`]: Figures 5 to 9 from these runs; `figure` draws.
+//! * [`fins`]: its Eq. 9-14, and the force that it drops, in falls of the flight computer.
 //! * [`fall`]: the fall of its Fig. 5, in space, and from which tilts that vehicle settles.
 
 mod cases;
 pub(crate) mod fall;
 mod figure;
 pub(crate) mod figures;
+pub(crate) mod fins;
 mod flown;
 mod objective;
 mod text;
@@ -22,11 +24,11 @@ use flight::vehicles::motors::MotorError;
 use paper::plane::dynamics::PlanarState;
 use sim::world::plant::WorldError;
 
-pub(crate) use cases::{Case, Table};
+pub(crate) use cases::{Case, Table, Verdict};
 use figure::FigureError;
 pub(crate) use flown::{AsPrinted, as_printed};
 pub(crate) use objective::Objective;
-pub(crate) use text::{write_stability, write_tables};
+pub(crate) use text::{write_stability, write_tables, write_verdicts};
 
 /// One experiment: the paper's result and ours.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,6 +41,13 @@ pub(crate) struct Row {
     pub(crate) open_loop: Finish,
     /// The end of the closed-loop flight.
     pub(crate) closed_loop: Finish,
+}
+
+impl Row {
+    /// What became of the printed final state: by the plan's end, which is what the paper prints.
+    pub(crate) fn verdict(&self) -> Verdict {
+        Verdict::of(self.case.paper.as_ref(), &self.open_loop.state)
+    }
 }
 
 /// How one landing ended.
@@ -87,12 +96,14 @@ pub(crate) struct Experiments {
     pub(crate) rows: Vec<Row>,
     /// What Table 3's J could be.
     pub(crate) objective: Objective,
+    /// How far the start may deviate: name, the paper's largest, ours, and its step.
+    pub(crate) ranges: [(&'static str, f64, f64, f64); 3],
 }
 
 /// All of the paper's experiments.
 pub(crate) fn experiments() -> Experiments {
     let rows: Vec<Row> = cases::all().into_iter().map(experiment).collect();
-    Experiments { objective: Objective::new(&rows), rows }
+    Experiments { objective: Objective::new(&rows), ranges: cases::ranges(), rows }
 }
 
 /// Why an experiment cannot be run.
@@ -108,6 +119,13 @@ pub(crate) enum PaperError {
     World(#[from] WorldError),
     #[error(transparent)]
     Figure(#[from] FigureError),
+    #[error(transparent)]
+    Recipe(#[from] sim::recipe::RecipeError),
+    #[error(transparent)]
+    SetUp(#[from] sim::sortie::SetUpError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Output(#[from] std::io::Error),
 }
 
 fn experiment(case: Case) -> Row {
@@ -163,6 +181,34 @@ mod tests {
                     finish.broken.join(", ")
                 );
             }
+        }
+    }
+
+    /// The page has the verdicts as the program writes them, and the entry of each table has those
+    /// of its rows.
+    #[test]
+    fn the_page_has_the_computed_verdicts() {
+        let page =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../docs/paper.md")).unwrap();
+        let rows = experiments().rows;
+        let mut written = Vec::new();
+        write_verdicts(&mut written, &rows).unwrap();
+        let written = String::from_utf8(written).unwrap();
+        assert!(page.contains(&written), "docs/paper.md is to have\n{written}");
+        for table in Table::ALL {
+            let (number, _) = table.title().split_once(':').unwrap();
+            let mut verdicts: Vec<&str> = Vec::new();
+            for row in rows.iter().filter(|row| row.case.table == table && row.case.paper.is_some()) {
+                if !verdicts.contains(&row.verdict().name()) {
+                    verdicts.push(row.verdict().name());
+                }
+            }
+            let verdicts = verdicts.join("**, **");
+            let entry = page.lines().find(|line| {
+                let head = line.split('|').nth(1).unwrap_or_default();
+                head.contains(number) && line.contains(&format!("| **{verdicts}** |"))
+            });
+            assert!(entry.is_some(), "the entry of {number} in docs/paper.md is to have **{verdicts}**");
         }
     }
 

@@ -40,8 +40,45 @@ pub(crate) fn write_tables(
         landed(|row| row.paper_landed.is_some()),
         n = rows.len(),
     )?;
+    writeln!(out, "\nLargest deviation of the start, alone and to either side, with a plan inside Table 2")?;
+    for (name, printed, ours, step) in experiments.ranges {
+        writeln!(out, "  {name:<12} {ours:>7} (in steps of {step}); the paper tries {printed}")?;
+    }
     write_objective(out, &experiments.objective)?;
     write_printed(out, printed)
+}
+
+/// Writes a line of Markdown for each row: the printed final state, ours, and the verdict.
+///
+/// # Errors
+/// The output cannot be written.
+pub(crate) fn write_verdicts(out: &mut impl Write, rows: &[Row]) -> io::Result<()> {
+    let values = |state: &PlanarState| {
+        // Without the sign of a zero.
+        let text = |value: f64, digits: usize| {
+            let text = format!("{value:.digits$}");
+            if text.trim_matches(['-', '0', '.']).is_empty() { text.replace('-', "") } else { text }
+        };
+        [
+            text(state.x_m, 2),
+            text(state.theta_rad.to_degrees(), 2),
+            text(state.u_m_s, 3),
+            text(state.w_m_s, 3),
+            text(state.q_rad_s.to_degrees(), 2),
+        ]
+        .join(", ")
+    };
+    writeln!(
+        out,
+        "| | the paper: x m, pitch deg, u m/s, w m/s, q deg/s | ours | verdict |\n|---|---|---|---|"
+    )?;
+    for row in rows {
+        let (table, _) = row.case.table.title().split_once(':').unwrap_or_default();
+        let printed = row.case.paper.map_or_else(String::new, |paper| values(&paper.state()));
+        let ours = values(&row.open_loop.state);
+        writeln!(out, "| {table}, {} | {printed} | {ours} | {} |", row.case.name(), row.verdict().name())?;
+    }
+    Ok(())
 }
 
 /// The paper's J beside every definition tried.
