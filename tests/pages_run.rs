@@ -45,7 +45,11 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ),
     ("docs/engineer.md", "replay-rerun ", "needs the line above"),
     ("docs/engineer.md", "rerun ", "opens a window"),
-    ("docs/engineer.md", "replay import ", "needs logs of other programs; replay/tests/replay/import.rs makes some"),
+    (
+        "docs/engineer.md",
+        "replay import ",
+        "needs logs of other programs; replay/tests/replay/import.rs makes some",
+    ),
     ("docs/engineer.md", "lichtblick ", "opens a window"),
     (
         "docs/build-mk3.md",

@@ -104,13 +104,11 @@ pub mod estimation {
     //!
     //! * [`estimator`] finds state and wind from the sensors.
     //! * [`motor_estimate`] finds impulse, burn time and ignition of the motor.
-    //! * [`other_curves`] identifies which of the certified thrust curves the motor has.
     //! * `spikes` removes single wrong pressures.
     //! * [`sensor_watch`] detects silent sensors and implausible samples.
 
     pub mod estimator;
     pub mod motor_estimate;
-    pub mod other_curves;
     pub mod sensor_watch;
     pub(crate) mod spikes;
 }

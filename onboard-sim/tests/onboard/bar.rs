@@ -5,7 +5,6 @@
 use onboard_sim::row::Row;
 use onboard_sim::tally;
 use sim::recipe::Recipe;
-use sim::sortie::Sortie;
 
 fn flown(dispersion: &str, flights: u64) -> Vec<Row> {
     flown_by(&Recipe::built_in(flight::vehicles::mission::DEFAULT, dispersion).unwrap(), flights)
@@ -33,8 +32,7 @@ fn regress_flights_with_field_dispersions_land_on_their_legs() {
 }
 
 /// The vehicle expects the certified curve, and its motor has one half way to that of old stock:
-/// 250 of 300 flights stand, and 243 where the thrust also rises slowly. The old one itself, with
-/// 10 % less impulse, lands 38 of 300 (seed 2002).
+/// 245 of 300 flights stand. The old one itself, with 10 % less impulse, lands 36 of 300 (seed 2002).
 #[test]
 fn regress_a_motor_half_way_to_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();
@@ -43,20 +41,4 @@ fn regress_a_motor_half_way_to_the_other_of_its_name_is_landed_on() {
     recipe.dispersion.mismatch.ignition_tail_s = 0.0;
     let between = flown_by(&recipe, 20).iter().filter(|row| row.stands).count();
     assert!(between >= 16, "{between} of 20");
-}
-
-/// Also with a rise of the thrust, which looks like a weak motor at first.
-#[test]
-fn the_curve_of_another_motor_is_identified_in_flight() {
-    let mut recipe = Recipe::built_in("mk3", "real").unwrap();
-    recipe.dispersion.mismatch.other_curve = [1.0, 1.0];
-    let identified = |number| {
-        let mut flight = Sortie::new(&recipe, number).unwrap();
-        while flight.goes_on() {
-            flight.step();
-        }
-        flight.pilot().other_curve() == Some("H45W")
-    };
-    let count = (0..20).filter(|number| identified(*number)).count();
-    assert!(count >= 18, "{count} of 20");
 }

@@ -147,7 +147,7 @@ impl<'a> VehicleState<'a> {
         let (released_at_s, flown) = computer.released_at_s().zip(computer.flown())?;
         let pilot = computer.pilot();
         let estimate = pilot.estimate()?;
-        let burn = pilot.motor().burn(pilot.curve());
+        let burn = pilot.motor().burn(&self.mission().motor_curve);
         let burning_s = pilot.burning_s(flown.time_s);
         let burnt_kg = burning_s.map_or(0.0, |burning_s| burn.burnt_kg(burning_s));
         let feet_m = self.feet_below_cg_m(burnt_kg);
@@ -156,7 +156,7 @@ impl<'a> VehicleState<'a> {
 
     fn feet_below_cg_m(&self, burnt_kg: f64) -> f64 {
         let (airframe, propellant_kg) =
-            (&self.mission().airframe, self.computer.pilot().curve().propellant_mass_kg());
+            (&self.mission().airframe, self.mission().motor_curve.propellant_mass_kg());
         airframe.above_feet_m(MassModel::new(&airframe.mass, propellant_kg).at(burnt_kg).cg_station_m)
     }
 

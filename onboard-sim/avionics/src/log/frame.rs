@@ -1,6 +1,5 @@
 //! The flight computer's frames as log records, and back, bit for bit.
 
-use alloc::borrow::ToOwned as _;
 use alloc::vec::Vec;
 
 use flight::computer::crew::{CrewCommand, Ending, Request};
@@ -180,7 +179,6 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
         ignition_sigma_s: sigmas[2],
         air_scale_sigma: sigmas[3],
         shape_deviation_sigma: sigmas[4],
-        other_curve: pilot.other_curve().map(str::to_owned),
     })
 }
 

@@ -869,7 +869,7 @@ fn seen_in_flight(
         }
         Sign::Impulse => {
             let sigma = motor.sigmas()[0];
-            let [impulse, _] = pilot.scales();
+            let impulse = pilot.motor().impulse_scale();
             let off = (impulse - 1.0).abs();
             let known = burns
                 && !watcher.astray
@@ -880,7 +880,8 @@ fn seen_in_flight(
         }
         Sign::BurntOutEarly => {
             let MotorStage::EndedEarly { at_s } = motor.stage() else { return None };
-            let ends_s = motor.ignition_s()? + motor.burn_time_stretch() * pilot.curve().burn_time_s();
+            let ends_s =
+                motor.ignition_s()? + motor.burn_time_stretch() * pilot.mission().motor_curve.burn_time_s();
             (ends_s - at_s > EARLY_S).then(|| seen(at_s, ends_s - at_s, 0.0, ""))
         }
         Sign::NoPlan => {

@@ -238,12 +238,11 @@ pub struct Mission {
     /// mission looks the motor up.
     #[serde(skip)]
     pub motor_curve: ThrustCurve,
-    /// Other curves that the landing motor may turn out to have: names of built-in motors, or texts
-    /// of motor files.
+    /// Other motors that the landing motor may turn out to be in a simulation (`other_curve` of a
+    /// dispersion): names of built-in motors, or texts of motor files.
     #[serde(default)]
     pub other_motors: Vec<String>,
-    /// The other certified curves, and before each the one half way to it. The reader of the
-    /// mission looks them up.
+    /// Their certified curves. The reader of the mission looks them up.
     #[serde(skip)]
     pub other_curves: Vec<ThrustCurve>,
     /// Measured burns of the motor's lot. The reader of the mission applies them to the motor's
@@ -322,13 +321,6 @@ impl Mission {
     pub fn start_height_m(&self) -> f64 {
         let dropped = self.drop.filter(|_| self.start.at == StartPoint::Drone);
         dropped.map_or(self.start.height_m, |drop| drop.height_m)
-    }
-
-    /// The prior of a motor with another curve than the expected one: its lot has no measured
-    /// burns.
-    pub(crate) fn unknown_motor(&self) -> MotorPrior {
-        let MotorPrior { impulse_sigma, burn_time_sigma, .. } = MotorPrior::default();
-        MotorPrior { impulse_sigma, burn_time_sigma, ..self.motor }
     }
 
     /// Applies the lot, whose scales are relative to `curve`; without a lot, that curve.

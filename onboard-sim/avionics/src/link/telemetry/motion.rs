@@ -207,7 +207,7 @@ pub(super) fn descent(state: &VehicleState<'_>, boot_number: u32) -> Option<MavM
         wind_x_m_s: air.estimate.wind_m_s.x as f32,
         wind_y_m_s: -air.estimate.wind_m_s.y as f32,
         drag_scale: motor.air_scale() as f32,
-        thrust_scale: state.computer.pilot().scales()[0] as f32,
+        thrust_scale: state.computer.pilot().motor().impulse_scale() as f32,
         touchdown_x_m: touchdown_m.x as f32,
         touchdown_y_m: -touchdown_m.y as f32,
         chute: chute(state, &air),

@@ -30,14 +30,12 @@ use crate::control::aim::AimLoop;
 use crate::estimation::estimator::alignment::ImuCalibration;
 use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncertainty};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
-use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{ControlLevel, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::{Mission, StartPoint};
 use crate::vehicle::rigid::RigidState;
-use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// Minimum number of frames between plans.
 pub const FRAMES_PER_PLAN: u64 = 10;
@@ -106,10 +104,6 @@ impl Pilot {
             mission: Arc::new(mission.clone()),
             mass: MassModel::new(&airframe.mass, mission.motor_curve.propellant_mass_kg()),
             motor: MotorEstimate::new(&MotorPrior { frame_s, ..mission.motor }),
-            others: OtherCurves::new(
-                mission.other_curves.len(),
-                &MotorPrior { frame_s, ..mission.unknown_motor() },
-            ),
         };
         let (powered, search) = model.guidance();
         Self {
@@ -182,25 +176,6 @@ impl Pilot {
         &self.prediction
     }
 
-    /// The landing motor's curve: the expected one, or another identified in its burn.
-    pub fn curve(&self) -> &ThrustCurve {
-        self.model.curve()
-    }
-
-    /// The motor's name if another curve than the expected one was identified in its burn.
-    pub fn other_curve(&self) -> Option<&str> {
-        self.model.others.chosen().map(|_| self.curve().name())
-    }
-
-    /// Estimated impulse and burn time of the motor, relative to the expected curve.
-    pub fn scales(&self) -> [f64; 2] {
-        let (motor, curve, expected) = (self.motor(), self.curve(), &self.mission().motor_curve);
-        [
-            motor.impulse_scale() * (curve.total_impulse_n_s() / expected.total_impulse_n_s()),
-            motor.burn_time_stretch() * (curve.burn_time_s() / expected.burn_time_s()),
-        ]
-    }
-
     /// The motor estimate of this flight, and the scale of the aerodynamic forces.
     pub fn motor(&self) -> &MotorEstimate {
         &self.model.motor
@@ -257,7 +232,6 @@ impl Pilot {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SavedPilot {
     motor: MotorEstimate,
-    other_curve: Option<usize>,
     estimate: Option<Estimate>,
     accelerometer_scale: f64,
     speeds: VerticalSpeeds,
@@ -275,7 +249,6 @@ impl Pilot {
     pub(super) fn saved(&self) -> SavedPilot {
         SavedPilot {
             motor: self.model.motor,
-            other_curve: self.model.others.chosen(),
             estimate: self.estimate,
             accelerometer_scale: self.estimator.calibration().accelerometer_scale,
             speeds: self.speeds,
@@ -335,9 +308,6 @@ impl Pilot {
             ..self.clone()
         };
         resumed.model.motor = saved.motor;
-        if saved.motor.ignition_s().is_some() {
-            resumed.model.others = OtherCurves::chosen_before(saved.other_curve);
-        }
         resumed
     }
 }
@@ -349,12 +319,8 @@ pub(super) mod sample;
 mod tests {
     use nalgebra::{UnitQuaternion, Vector3};
 
-    use super::Pilot;
     use crate::computer::pilot::sample::{falling, input, released};
-    use crate::estimation::estimator::StartUncertainty;
-    use crate::estimation::motor_estimate::MotorSample;
     use crate::estimation::sensor_watch::SensorWatch;
-    use crate::vehicle::rigid::RigidState;
 
     #[test]
     fn the_attitude_is_extrapolated_over_the_lost_time() {
@@ -373,37 +339,5 @@ mod tests {
         let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
         let expected = estimate.state.world_from_body * turned;
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));
-    }
-
-    /// A restart in the burn restores the identified curve; one in the fall leaves the choice open.
-    #[test]
-    fn a_restart_preserves_the_choice_of_the_curve() {
-        let mission = crate::vehicles::mission::builtin("mk3").unwrap().unwrap();
-        let powered_up = || {
-            let uncertainty = StartUncertainty::at_apogee();
-            Pilot::starting(&mission, 0.0, &RigidState::upright(300.0), &uncertainty)
-        };
-        let mut pilot = powered_up();
-        let other = mission.other_curves.last().unwrap();
-        for frame in 1..=200_u32 {
-            let time_s = f64::from(frame) * 0.005;
-            pilot.model.learn(&MotorSample {
-                time_s,
-                axial_specific_force_m_s2: other.thrust_at_n(time_s - 0.1) / 3.3,
-                mass_kg: 3.3,
-                axial_air_force_n: 0.0,
-                gimbal_rad: [0.0; 2],
-                may_burn: true,
-            });
-            if frame == 10 {
-                assert_eq!(
-                    powered_up().resumed(&pilot.saved(), time_s).model.others,
-                    powered_up().model.others
-                );
-            }
-        }
-        let resumed = powered_up().resumed(&pilot.saved(), 1.2);
-        assert_eq!((resumed.other_curve(), resumed.curve()), (Some("H45W"), other));
-        assert_eq!(resumed.scales().map(f64::to_bits), pilot.scales().map(f64::to_bits));
     }
 }

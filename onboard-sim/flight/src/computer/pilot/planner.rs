@@ -177,7 +177,7 @@ impl VehicleModel {
 impl Pilot {
     /// A planner with a copy of the pilot's model, without a request.
     pub(super) fn planner(model: &VehicleModel, search: Search) -> Box<Planner> {
-        Box::new(Planner { model: model.without_filters(), requested: None, search, found: None })
+        Box::new(Planner { model: model.clone(), requested: None, search, found: None })
     }
 
     /// Requests a prediction or a landing. Returns whether it could: a new request waits until the
@@ -186,7 +186,7 @@ impl Pilot {
         let Some(planner) = self.planner.as_mut().filter(|_| self.request_s.is_none()) else { return false };
         self.request_s = Some(time_s);
         self.powered.begin(&mut planner.search);
-        planner.model = self.model.without_filters();
+        planner.model = self.model.clone();
         planner.request(time_s, estimate, problem);
         true
     }

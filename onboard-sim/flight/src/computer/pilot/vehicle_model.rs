@@ -8,14 +8,12 @@ use serde::Serialize;
 
 use crate::estimation::estimator::{Estimate, VehicleNow};
 use crate::estimation::motor_estimate::{MotorEstimate, MotorSample};
-use crate::estimation::other_curves::OtherCurves;
 use crate::guidance::powered::{PoweredGuidance, PoweredSituation, Search};
 use crate::guidance::vertical::Column;
 use crate::vehicle::airframe::{Airframe, MassModel, MassProperties};
 use crate::vehicle::burn::Burn;
 use crate::vehicle::mission::Mission;
 use crate::vehicle::rigid::RigidState;
-use crate::vehicle::thrust_curve::ThrustCurve;
 
 /// The vehicle model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,8 +26,6 @@ pub(super) struct VehicleModel {
     pub(super) mass: MassModel,
     /// Estimated motor and scale of the aerodynamic forces.
     pub(super) motor: MotorEstimate,
-    /// Whether another curve than the expected one was identified.
-    pub(super) others: OtherCurves,
 }
 
 /// The vehicle with its motor burning, in one frame.
@@ -44,12 +40,6 @@ pub(super) struct Burning {
 }
 
 impl VehicleModel {
-    /// A copy for a plan: the identified curve, without the filters that identify it.
-    pub(super) fn without_filters(&self) -> Self {
-        let others = OtherCurves::chosen_before(self.others.chosen());
-        Self { mission: Arc::clone(&self.mission), others, ..*self }
-    }
-
     /// Air density at the estimated height, kg/m3.
     pub(super) fn density_kg_m3(&self, estimate: &Estimate) -> f64 {
         self.mission.site.air_at_m(estimate.state.position_m.z).density_kg_m3
@@ -68,15 +58,9 @@ impl VehicleModel {
         VehicleNow::of(self.airframe(), mass, density_kg_m3, fins_rad, burns, levers)
     }
 
-    /// The motor's curve: the expected one, or another identified in its burn.
-    pub(super) fn curve(&self) -> &ThrustCurve {
-        self.others.flown(&self.mission)
-    }
-
     /// Updates the motor and drag estimates with a frame.
     pub(super) fn learn(&mut self, sample: &MotorSample) {
-        self.motor.update(self.others.flown(&self.mission), sample);
-        self.others.update(&mut self.motor, &self.mission.other_curves, sample);
+        self.motor.update(&self.mission.motor_curve, sample);
     }
 
     pub(super) fn airframe(&self) -> &Airframe {
@@ -91,7 +75,7 @@ impl VehicleModel {
     /// Whether the complete burn time has passed. A motor that stopped early does not count as
     /// burned out before that.
     pub(super) fn burn_is_over(&self, time_s: f64) -> bool {
-        let whole_s = self.motor.burn_time_stretch() * self.curve().burn_time_s();
+        let whole_s = self.motor.burn_time_stretch() * self.mission.motor_curve.burn_time_s();
         self.burning_s(time_s).is_some_and(|burning_s| burning_s >= whole_s)
     }
 
@@ -100,7 +84,7 @@ impl VehicleModel {
     }
 
     pub(super) fn burn(&self) -> Burn<'_> {
-        self.motor.burn(self.curve())
+        self.motor.burn(&self.mission.motor_curve)
     }
 
     /// The motor with `sigmas` standard deviations more (positive) or less impulse than expected
@@ -116,7 +100,7 @@ impl VehicleModel {
             (burning_s * burn.thrust_n(burning_s) - until_s * burn.thrust_n(until_s)) / burn.time_scale,
             burn.fading_n_s(burning_s, until_s),
         ];
-        self.motor.dispersed(self.curve(), derivatives, sigmas)
+        self.motor.dispersed(&self.mission.motor_curve, derivatives, sigmas)
     }
 
     pub(super) fn column(&self, density_kg_m3: f64, soft_tilt_deg: f64) -> Column {

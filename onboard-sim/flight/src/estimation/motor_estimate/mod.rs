@@ -108,9 +108,6 @@ pub struct MotorEstimate {
     /// Frames in a row with far too little thrust.
     starved_frames: u32,
     rise: Rise,
-    /// Sum of the misfits of the burn's frames, and how many were compared.
-    misfit: f64,
-    compared: u32,
 }
 
 // The prior is constant; everything that changes is in the mean and the covariance.
@@ -171,15 +168,7 @@ impl MotorEstimate {
             updated_at_s: 0.0,
             starved_frames: 0,
             rise: Rise::default(),
-            misfit: 0.0,
-            compared: 0,
         }
-    }
-
-    /// How badly the burn's frames fit the curve: minus twice the logarithm of their likelihood,
-    /// but for a constant, as the mean of a frame. Infinite before the first.
-    pub fn misfit(&self) -> f64 {
-        if self.compared == 0 { f64::INFINITY } else { self.misfit / f64::from(self.compared) }
     }
 
     /// State of the motor.
@@ -370,11 +359,6 @@ impl MotorEstimate {
             return;
         }
         let since_s = middle_s - self.mean[IGNITION];
-        if since_s > COMPARED_S {
-            // Certified motors do not scatter so far, so the prior of the impulse does not hold.
-            let missing_share = core::mem::take(&mut self.rise.missing_share);
-            self.covariance[(IMPULSE, IMPULSE)] += missing_share * missing_share;
-        }
         let (thrust_n, by_motor) = self.thrust(curve, since_s);
         if since_s < SPIKE_S || thrust_n < TAIL_SHARE * curve.peak_thrust_n() {
             self.starved_frames = 0;
@@ -417,7 +401,9 @@ impl MotorEstimate {
         if weak && share < RISEN_SHARE {
             self.rise.given_n_s /= share;
             self.rise.advance(curve);
-            self.rise.missing_share = RISEN_SHARE - share;
+            // Certified motors do not scatter so far, so the prior of the impulse does not hold.
+            let missing_share = RISEN_SHARE - share;
+            self.covariance[(IMPULSE, IMPULSE)] += missing_share * missing_share;
         }
         let along_s = self.rise.along_s;
         // A linear rise to a share r in a time t has advanced by r t / 2 along the curve, and is
@@ -468,11 +454,6 @@ impl MotorEstimate {
             + gust_n * gust_n * frames(GUST_LASTS_S);
         let with = self.covariance * sensitivity;
         let variance = product(&sensitivity, &with) + noise;
-        let missed = innovation_n * innovation_n / variance;
-        if self.stage == MotorStage::Burning {
-            self.misfit += missed.min(GATE_SIGMAS * GATE_SIGMAS) + libm::log(variance);
-            self.compared += 1;
-        }
         if innovation_n * innovation_n > GATE_SIGMAS * GATE_SIGMAS * variance {
             return;
         }
@@ -549,9 +530,6 @@ const EARLIER_SHARE_S: f64 = 0.06;
 const RISEN_SHARE: f64 = 0.9;
 const STILL_RISING: f64 = 0.02;
 const RISE_MAX_S: f64 = 1.0;
-/// Time from the ignition from which the impulse of a weak motor may lie outside of its prior, s:
-/// earlier every curve would fit, and the motor's could not be identified.
-pub(super) const COMPARED_S: f64 = 0.5;
 /// Below this share of the curve's thrust a rising motor has gone out.
 const FLAME_SHARE: f64 = 0.05;
 /// A rise that delays the burn by less than this, s, cannot be distinguished from that of the
@@ -569,8 +547,6 @@ struct Rise {
     /// Measured thrust over that of the curve there, with two time constants.
     share: f64,
     earlier_share: f64,
-    /// How much of the curve's thrust a weak motor lacks, until its covariance contains it.
-    missing_share: f64,
     /// Time on the curve at which the motor chuffed, s; 0 if it did not.
     chuffed_s: f64,
 }

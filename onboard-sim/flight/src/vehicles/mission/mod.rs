@@ -109,8 +109,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     mission.changed = formulas.changed;
     validate::numbers(&mission, &|_| true).map_err(bad_value)?;
     for other in &mission.other_motors {
-        let other = motors::named(other)?;
-        mission.other_curves.extend([mission.motor_curve.towards(&other, 0.5), other]);
+        mission.other_curves.push(motors::named(other)?);
     }
     Ok(mission)
 }
