@@ -54,8 +54,10 @@ fn the_bounds_for_a_builder_follow_from_the_data() {
     };
     let share = SIGMAS * wrong.inertia_share;
     row_is("pitch inertia", [ten_s(0.0), ten_s(-share), ten_s(share)], 1);
-    // A rod of 0.5 m in the motor's place.
-    let (rod_mm, limit_deg) = (500.0, mk3.gimbal.limit_deg);
+    // The rod turns about the gimbal's ring.
+    let below_ring = PAGE.split("rod in place of the motor, to ").nth(1).unwrap();
+    let rod_m: f64 = below_ring.split(" m below the ring's middle").next().unwrap().parse().unwrap();
+    let (rod_mm, limit_deg) = (1e3 * rod_m, mk3.gimbal.limit_deg);
     let tip_mm = |deg: f64| rod_mm * libm::tan(deg.to_radians());
     row_is("thrust line, direction", [0.0, 0.0, tip_mm(SIGMAS * real.thrust_misalignment_deg)], 1);
     row_is("thrust line, position", [0.0, 0.0, 1e3 * SIGMAS * wrong.thrust_offset_m], 1);
@@ -105,4 +107,37 @@ fn val_hand_the_servo_of_a_fin() {
     assert!((fin_row("width along the skin")[0] - 1e3 * fins.width_m).abs() < 0.05);
     let opens_s = fins.servo.delay_s + (fins.open_deg - fins.closed_deg) / fins.servo.rate_deg_s;
     assert!(section.contains(&format!("the {opens_s:.2} s that their servos take")), "{opens_s}");
+}
+
+/// The cut lengths of a leg's tubes and wire reach from the skin at the hinge and at the tail to the
+/// joint above the foot.
+#[test]
+fn val_hand_the_lengths_of_a_leg() {
+    let airframe = mission::builtin_airframe("mk3").unwrap();
+    let legs = PAGE.split("\n## Legs\n").nth(1).unwrap().split("\n## ").next().unwrap();
+    let number = |before: &str, after: &str| -> f64 {
+        let text = legs.split(before).nth(1).unwrap().split(after).next().unwrap();
+        text.split_whitespace().next_back().unwrap().parse().unwrap()
+    };
+    let hinge_m = number("```text", " m  |o)");
+    let joint_m = number("wire  '-O' '", " m: the joint");
+    let across_m = airframe.legs.foot_radius_m - airframe.body.diameter_m / 2.0;
+    let tube_m =
+        number("tube of 14 mm,", " m") + number("tube of 12 mm,", " m,") - 1e-3 * number("glued", " mm deep");
+    assert!((tube_m - across_m.hypot(hinge_m - joint_m)).abs() < 0.001, "{tube_m}");
+    assert!((number("12 x 10 mm,", " m from hinge") - tube_m).abs() < 0.001);
+    let angle_deg = libm::atan2(across_m, hinge_m - joint_m).to_degrees();
+    assert!((number("from hinge to joint, at", " degrees") - angle_deg).abs() < 0.5, "{angle_deg}");
+    assert!((number("7 x 7, 1 mm,", " m, 570") - across_m.hypot(joint_m)).abs() < 0.005);
+    // A tube's mass: its sections at the 1.6 g/cm3 of pultruded carbon.
+    let section_m2 =
+        |outside_m: f64, inside_m: f64| TAU / 8.0 * (outside_m * outside_m - inside_m * inside_m);
+    let tubes_kg = 1600.0
+        * (section_m2(0.014, 0.012) * number("tube of 14 mm,", " m")
+            + section_m2(0.012, 0.010) * number("tube of 12 mm,", " m,"));
+    assert!((number("- tube,", " kg") - tubes_kg).abs() < 0.001, "{tubes_kg}");
+    // The leg that is tested to its strength.
+    let crush = airframe.legs.crush.unwrap();
+    let tested = format!("to {} N along and {} N across", crush.strength_n, crush.strength_across_n);
+    assert!(legs.split_whitespace().collect::<Vec<_>>().join(" ").contains(&tested), "{tested}");
 }
