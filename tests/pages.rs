@@ -187,6 +187,12 @@ fn percent(count: u32, of: u32) -> String {
     format!("{:.1} %", 100.0 * f64::from(count) / f64::from(of))
 }
 
+/// As in `1,000`.
+fn with_separator(count: u32) -> String {
+    let (thousands, rest) = (count / 1_000, count % 1_000);
+    if thousands == 0 { rest.to_string() } else { format!("{thousands},{rest:03}") }
+}
+
 /// Wilson's 95 % interval, as in `88.3 to 92.0`.
 fn interval(count: u32, of: u32) -> String {
     let (share, n, z) = (f64::from(count) / f64::from(of), f64::from(of), 1.959_964_f64);
@@ -208,11 +214,10 @@ fn cells(page: &str, first: &str) -> Vec<String> {
 fn the_landing_rates_on_the_pages_are_the_measured_ones() {
     let (missions, mk3) = (page("README.md") + &page("docs/engineer.md"), page("docs/build-mk3.md"));
     for rate in rates().iter().filter(|rate| matches!(rate.dispersion.as_str(), "field" | "real")) {
-        let of = if rate.flights == 1_000 { "1,000".to_owned() } else { rate.flights.to_string() };
         let row = cells(&missions, &format!("`{}` |", rate.mission));
         let column = if rate.dispersion == "field" { 2 } else { 3 };
-        let Rate { stands, envelope, table_2, .. } = rate;
-        assert_eq!(row[column], format!("{stands}, {envelope}, {table_2} of {of}"), "{rate:?}");
+        let [stands, envelope, of] = [rate.stands, rate.envelope, rate.flights].map(with_separator);
+        assert_eq!(row[column], format!("{stands}, {envelope}, {} of {of}", rate.table_2), "{rate:?}");
     }
     for dispersion in ["field", "real", "harsh", "real-harsh"] {
         for mission in ["mk2", "mk3"] {
