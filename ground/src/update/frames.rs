@@ -115,10 +115,6 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         }
     }
     model.link.date(&message, now);
-    if let Some(answer) = answer_to_ping(&message, frame.source()) {
-        model.outbox.push(Action::send(answer));
-        return;
-    }
     match &message {
         MavMessage::STATUSTEXT(chunk) => {
             for text in model.texts.push(frame.source(), chunk, now) {
@@ -147,51 +143,6 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     vehicle_changes::enter_crew_changes(model, &before, &after, now);
     pad::enter_check(model, now);
     commands::observe(model, now);
-}
-
-fn report(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, source: u16) -> StatusReport {
-    StatusReport {
-        uid: status.vehicle_uid,
-        boot: status.boot_number,
-        clock_ms: status.time_boot_ms,
-        sequence: frame.sequence(),
-        source,
-    }
-}
-
-/// Which vehicle has sent a message, and since which power-up; `None` before the first flight
-/// status.
-fn speaker(
-    model: &mut Model,
-    frame: &Frame,
-    (message, named): (&MavMessage, Option<u32>),
-    now: Duration,
-) -> Option<BootId> {
-    match message {
-        MavMessage::TD_FLIGHT_STATUS(status) => {
-            Some(model.boots.hear(&report(status, frame, model.link.source), now))
-        }
-        // What another autopilot says beside ours is noted at the shown one.
-        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
-        _ => {
-            let said = (named, time_boot_ms(message), frame.sequence());
-            model.boots.speaker(model.link.source, said, now)
-        }
-    }
-}
-
-/// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer
-/// itself; answering it would never end.
-#[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
-fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
-    let MavMessage::PING(data) = message else { return None };
-    if data.target_system != 0 || data.target_component != 0 {
-        return None;
-    }
-    let mut answer = data.clone();
-    answer.target_system = source.system_id;
-    answer.target_component = source.component_id;
-    Some(MavMessage::PING(answer))
 }
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
