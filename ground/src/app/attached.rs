@@ -198,9 +198,7 @@ async fn act(
                 link.ask(&ToStation::Key(action.detail)).await;
             }
             Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
-                if let Some(ended) = output.act(&action) {
-                    model.warn(now, ended.to_string());
-                }
+                output.act(&action, model, now);
             }
             Action::Quit => quit = true,
             // The station itself sends, records and reports.

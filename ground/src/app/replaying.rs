@@ -113,7 +113,7 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
                     return Ok(());
                 }
                 for action in actions {
-                    output.act(&action);
+                    output.act(&action, &mut player.model, now);
                 }
             }
             _ = steps.tick() => {

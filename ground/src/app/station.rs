@@ -51,11 +51,11 @@ pub(super) struct Station {
     pub(super) own: Answers,
     pub(super) alarm_command: Option<String>,
     /// Why the newest alarm command could not be started, if so.
-    pub(super) alarm_failure: Option<Receiver<std::io::Error>>,
+    pub(super) alarm_failure: Option<Receiver<Option<std::io::Error>>>,
     /// A file for the next run could not be written, which was reported.
     pub(super) not_saved: bool,
-    /// The report that is being written.
-    pub(super) report: Option<programs::Writing>,
+    /// The report that is being written: its path, or why there is none.
+    pub(super) report: Option<Receiver<Result<String, String>>>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// The file of the checklist's signatures; `None` without a checklist.
@@ -297,7 +297,7 @@ impl Station {
 
     /// Takes the outcomes of what runs beside the loop.
     pub(super) fn take_outcomes(&mut self, model: &mut Model, wire: &mut Wire) {
-        if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()) {
+        if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()?) {
             self.give_up_alarm_command(&error);
         }
         let now = self.clock.now();
@@ -375,9 +375,7 @@ impl Station {
                     }
                 }
                 Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
-                    if let Some(ended) = self.output.act(&action) {
-                        model.warn(now, ended.to_string());
-                    }
+                    self.output.act(&action, model, now);
                 }
                 Action::Alarm(words) => self.tell_alarm(&words),
                 Action::WriteReport => self.write_report(model, now),
@@ -393,11 +391,10 @@ impl Station {
     }
 
     fn write_report(&mut self, model: &mut Model, now: Duration) {
-        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
-        match log.map(|log| programs::begin_report(&log)) {
-            Some(Ok(writing)) => self.report = Some(writing),
-            Some(Err(why)) => model.warn(now, format!("no report: {why}")),
-            None => {}
+        let Some(log) = self.recorder.as_ref().map(|recorder| recorder.path().to_owned()) else { return };
+        match programs::in_a_thread("report", move || programs::write_report(&log)) {
+            Ok(writing) => self.report = Some(writing),
+            Err(why) => model.warn(now, format!("no report: {why}")),
         }
     }
 
