@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::{Act, Page, Seat};
-use ground::replay::recording::{RecordedEvent, Recording};
+use ground::replay::recording::Recording;
 use ground::update::{Msg, Request};
 use ground::view::theme::{Ink, Level, Palette, TextRole, Theme, true_colour};
 use ground::view::{CUT_MARK, footer};
@@ -404,20 +404,19 @@ struct Moment {
 fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/flight.tlog");
     let recording = Recording::load(&path, None).expect("the recorded flight");
-    let mut reader = recording.reader().expect("the recorded flight");
+    let reader = recording.reader().expect("the recorded flight");
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     let status = TD_FLIGHT_STATUS_DATA::default();
     let mut moment = Moment { rig, phase: TdPhase::TD_PHASE_SAFE, status, height_m: f64::INFINITY };
-    while let Some((at, event)) = reader.next_event().expect("the recorded flight") {
+    for event in reader {
+        let (at, event) = event.expect("the recorded flight");
         let rig = &mut moment.rig;
         while rig.now + Duration::from_millis(100) <= at {
             rig.run(0.1);
         }
         match event {
-            RecordedEvent::Commanded(kind) => rig.msg(Msg::Commanded(kind)),
-            RecordedEvent::Sent(_) => {}
-            RecordedEvent::Heard(frame) => {
+            Msg::Frame(frame) => {
                 match frame.decode().expect("a message of the vehicle") {
                     MavMessage::TD_FLIGHT_STATUS(status) => {
                         (moment.phase, moment.status) = (status.phase, status);
