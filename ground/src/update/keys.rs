@@ -390,11 +390,11 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
         Act::Note if act.works(model, now) => {
-            model.pages.entry = Some(TextEntry::Note { typed: String::new() });
+            model.pages.entry = Some(TextEntry::default());
         }
         Act::Note => model.info(now, "this screen only looks on; it keeps no notes"),
         Act::Palette => {
-            model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
+            model.pages.entry = Some(TextEntry { chosen: Some(0), ..TextEntry::default() });
         }
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
@@ -535,21 +535,7 @@ const TYPED_MAX: usize = crate::attach::NOTE_MAX;
 
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
 fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
-    let (mut typed, mut chosen) = match model.pages.entry.take() {
-        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
-        Some(TextEntry::Note { mut typed }) => {
-            return match key {
-                Key::Enter if !typed.trim().is_empty() => request(model, Request::Note(typed), now),
-                Key::Enter | Key::Escape => {}
-                _ => {
-                    edit(&mut typed, key);
-                    model.pages.entry = Some(TextEntry::Note { typed });
-                }
-            };
-        }
-        // Only a replay asks where to jump, and takes those keys itself.
-        None => return,
-    };
+    let Some(TextEntry { mut typed, chosen }) = model.pages.entry.take() else { return };
     match key {
         Key::Escape => return,
         Key::Enter => {
@@ -571,8 +557,9 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
             edit(&mut typed, key);
             chosen = 0;
         }
-    }
-    model.pages.entry = Some(TextEntry::Palette { typed, chosen });
+        _ => chosen.map(|_| 0),
+    };
+    model.pages.entry = Some(TextEntry { typed, chosen });
 }
 
 /// Does what an entry of the palette says. It goes the way of its key, so it never does more than
@@ -593,13 +580,5 @@ fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);
         }
-    }
-}
-
-pub(crate) fn edit(text: &mut String, key: Key) {
-    match key {
-        Key::Backspace => drop(text.pop()),
-        Key::Char(letter) if text.chars().count() < TYPED_MAX => text.push(letter),
-        _ => {}
     }
 }

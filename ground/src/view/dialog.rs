@@ -10,8 +10,8 @@ use ratatui::widgets::{Block, Clear};
 
 use super::{TextRole, Theme, draw_lines, lists};
 use crate::model::{
-    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
-    palette_entries, role_name, why_not_here, why_not_quit, why_untested,
+    AGAIN_KEY, Act, CONFIRM_WORD, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
+    foreign_name, palette_entries, role_name, why_not_here, why_not_quit, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -224,11 +224,9 @@ const KEY_COLUMNS: usize = 7;
 
 pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     // A note leaves the page to be seen.
-    let (title, rows) = match model.pages.entry {
-        Some(TextEntry::Palette { .. }) => ("Every action", area.height),
-        Some(TextEntry::Note { .. }) => ("Note for log and book", FRAME_ROWS + 1),
-        _ => return,
-    };
+    let Some(entry) = &model.pages.entry else { return };
+    let note = ("Note for log and book", FRAME_ROWS + 1);
+    let (title, rows) = entry.chosen.map_or(note, |_| ("Every action", area.height));
     let width = PALETTE_COLUMNS.min(area.width);
     let area = Rect { y: area.bottom().saturating_sub(rows), height: rows, ..area };
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
@@ -240,13 +238,10 @@ pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
 /// The typed text and this many of the actions found, the marked one among them. Empty while it is
 /// closed.
 pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
-    let (typed, chosen) = match &model.pages.entry {
-        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
-        Some(TextEntry::Note { typed }) => {
-            let keys = theme.label(" Enter keeps it, Esc does not");
-            return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
-        }
-        _ => return Vec::new(),
+    let Some(TextEntry { typed, chosen }) = &model.pages.entry else { return Vec::new() };
+    let Some(chosen) = chosen else {
+        let keys = theme.label(" Enter keeps it, Esc does not");
+        return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
     };
     let entries = palette_entries(model, typed, now);
     let head = Line::from(vec![
