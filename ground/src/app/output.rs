@@ -91,7 +91,6 @@ impl Output {
             }
             _ => {}
         }
-        None
     }
 
     /// Lets time pass for the model's view of the terminal.
@@ -142,7 +141,7 @@ impl Lines {
         let mut text = String::new();
         let shown = |event: &&Event| !model.settings.demonstration || is_of_the_flight(event);
         for event in model.events.since(self.seen).filter(shown) {
-            let (time_s, speaker, mark) = (event.at.as_secs_f64(), event.speaker.name(), event.mark());
+            let (time_s, speaker, mark) = (event.at.as_secs_f64(), event.speaker, event.mark());
             // Writing into a String cannot fail.
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
         }

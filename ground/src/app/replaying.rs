@@ -112,6 +112,7 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
                 if actions.contains(&Action::Quit) || matches!(msg, Msg::Terminate(_)) {
                     return Ok(());
                 }
+                let now = player.position();
                 for action in actions {
                     output.act(&action, &mut player.model, now);
                 }

@@ -242,20 +242,16 @@ impl Station {
         match news {
             ServerEvent::ScreenJoined { seat, watch } => {
                 self.screens.push(Attached { seat, watch, answers: Answers::default() });
-                Vec::new()
             }
-            ServerEvent::ScreenLeft(number) => {
-                self.screens.retain(|screen| screen.seat.screen != number);
-                Vec::new()
+            ServerEvent::ScreenLeft(number) => self.screens.retain(|screen| screen.seat.screen != number),
+            ServerEvent::FromScreen(by, ToStation::Request(request)) => {
+                return vec![Msg::Asked { request, by }];
             }
-            ServerEvent::FromScreen(by, ToStation::Request(request)) => vec![Msg::Asked { request, by }],
             ServerEvent::FromScreen(by, ToStation::Here) => {
                 self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.hear());
-                Vec::new()
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
-                Vec::new()
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
                 let told = stations::stopping(model, force, self.clock.now());
@@ -264,14 +260,16 @@ impl Station {
                 self.record_operator("stop", &operator, format!("asked for by {operator}: {ending}"));
                 // The asking process may be gone; the station ends in any case.
                 let _ = answer.send(told);
-                if stops { vec![Msg::Terminate("ground stop")] } else { Vec::new() }
+                if stops {
+                    return vec![Msg::Terminate("ground stop")];
+                }
             }
             ServerEvent::Question(_, answer) => {
                 let _ = answer.send(ToScreen::Status(stations::of(model, &self.screens)));
-                Vec::new()
             }
-            ServerEvent::FromScreen(..) => Vec::new(),
+            ServerEvent::FromScreen(..) => {}
         }
+        Vec::new()
     }
 
     fn record_operator(&mut self, kind: &str, who: &str, detail: String) {
@@ -459,7 +457,7 @@ impl Station {
         self.book = Some(book);
         self.record(first);
         for (name, role) in &model.settings.crew_roles {
-            let text = role_name(*role).to_owned();
+            let text = role_name(*role);
             self.enter(&BookLine { kind: "crew".to_owned(), who: name.clone(), text });
         }
     }
@@ -476,7 +474,7 @@ impl Station {
     fn sign_book(&mut self, at_once: bool) -> Option<Msg> {
         let now = self.clock.now();
         let book = self.book.as_mut()?;
-        let is_signed = book.is_signed();
+        let is_signed = book.key.is_some();
         let (head, record) = book.sign(now, at_once)?;
         self.record(record);
         Some(Msg::Book { head, is_signed })

@@ -279,7 +279,7 @@ impl LogEvents {
 fn command_in(frame: &Frame) -> Option<CommandKind> {
     let Ok(MavMessage::COMMAND_LONG(sent)) = frame.decode() else { return None };
     let is_sent = |kind: &CommandKind| {
-        let (command, param1) = kind.mav_command();
+        let (command, param1) = kind.row().mav;
         let fits = command == sent.command && (param1 - sent.param1).abs() < 0.5;
         // With the number of an ask it confirms that ask.
         let confirms = sent.param3 >= 1.0;

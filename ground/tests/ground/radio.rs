@@ -88,7 +88,6 @@ fn answers(rig: &mut Rig) -> usize {
 }
 
 #[test]
-#[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
 fn only_questions_to_this_station_are_answered() {
     let mut rig = Rig::crewed();
     let timesync = |target_system, target_component| {
