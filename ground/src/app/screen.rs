@@ -265,7 +265,7 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
 /// shows nothing about the line behind it.
 fn is_answered_by_another() -> bool {
     let is_set = |name: &&str| std::env::var_os(name).is_some();
-    ["TMUX", "STY"].iter().any(|name| is_set(name)) && is_set(&"SSH_CONNECTION")
+    ["TMUX", "STY"].iter().any(is_set) && is_set(&"SSH_CONNECTION")
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.
