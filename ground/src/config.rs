@@ -8,6 +8,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use clap::{ArgAction, ArgMatches, CommandFactory as _, FromArgMatches as _};
 use serde::{Deserialize, Deserializer, de};
+use strum::VariantArray as _;
 use toml::{Table, Value};
 
 use crate::cli::{Characters, Flags, LinkArgs, StationArgs, seconds};
@@ -50,9 +51,9 @@ fn every<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Duration>, D::Erro
 
 fn palette<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Palette>, D::Error> {
     let name = String::deserialize(from)?;
-    let palette = Palette::ALL.into_iter().find(|palette| format!("{palette:?}").eq_ignore_ascii_case(&name));
+    let palette = Palette::VARIANTS.iter().find(|palette| format!("{palette:?}").eq_ignore_ascii_case(&name));
     let wrong = || de::Error::custom(format!("`{name}`; give auto, dark, light or none"));
-    if name == "auto" { Ok(None) } else { palette.map(Some).ok_or_else(wrong) }
+    if name == "auto" { Ok(None) } else { palette.copied().map(Some).ok_or_else(wrong) }
 }
 
 fn command<'de, D: Deserializer<'de>>(from: D) -> Result<Option<String>, D::Error> {

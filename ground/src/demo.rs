@@ -9,7 +9,6 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use protocol::log::recorder::Recorder;
-use protocol::log::writer::LogHeader;
 use protocol::transport::LinkAddress;
 use sim::wire::fly;
 use sim::wire::fly::{FlyOptions, OnTheWire};
@@ -49,11 +48,6 @@ impl DemoOptions {
         }
         let system_id = args.flags.link.vehicle().system_id;
         Ok(Self { flight, speed: args.speed.unwrap_or(Speed::Factor(1.0)), system_id })
-    }
-
-    /// The header of the log that contains both sides.
-    pub fn log_header(&self, start_unix_ns: u64) -> LogHeader {
-        self.flight.log_header("ground", start_unix_ns)
     }
 }
 

@@ -28,10 +28,7 @@ pub enum Key {
 impl Key {
     /// The key of a terminal event; `None` for key releases and for keys without a meaning.
     pub fn from_event(event: &KeyEvent) -> Option<Self> {
-        if event.kind == KeyEventKind::Release {
-            return None;
-        }
-        if event.modifiers.contains(KeyModifiers::ALT) {
+        if event.kind == KeyEventKind::Release || event.modifiers.contains(KeyModifiers::ALT) {
             return None;
         }
         let ctrl = event.modifiers.contains(KeyModifiers::CONTROL);

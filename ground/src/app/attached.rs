@@ -105,7 +105,7 @@ pub async fn session(
                     let asked = model.link.abort_asked_at.take().is_some() || model.commands.is_aborting();
                     model.link.abort_unsent |= !viewer.watch && asked;
                     // If the station went away while sending the history, the history ends here.
-                    model.history_ends();
+                    model.alarms.history_ends();
                     model.link.station_gone = true;
                     update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
                 }
@@ -198,9 +198,7 @@ async fn act(
                 link.ask(&ToStation::Key(action.detail)).await;
             }
             Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
-                if let Some(ended) = output.act(&action) {
-                    model.warn(now, ended.to_string());
-                }
+                output.act(&action, model, now);
             }
             Action::Quit => quit = true,
             // The station itself sends, records and reports.
@@ -241,7 +239,7 @@ fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration
 /// Tells the crew that a request has not reached any station.
 fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
     let what = match *request {
-        Request::Command(kind) => &format!("{} NOT SENT", kind.name()),
+        Request::Command(kind) => &format!("{} NOT SENT", kind.row().name),
         Request::Acknowledge(kind) => {
             model.alarms.acknowledge(kind);
             return;
@@ -263,7 +261,7 @@ fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
 fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
     match told {
         ToScreen::Hello(hello) => model.settings = settings(&hello, viewer),
-        ToScreen::Live => model.history_ends(),
+        ToScreen::Live => model.alarms.history_ends(),
         ToScreen::Msg(msg) => {
             let mut actions = update(model, msg, at);
             actions.retain(|action| matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_)));

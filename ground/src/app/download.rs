@@ -83,12 +83,8 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             let tenths = 1 + 10 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
             if tenths > std::mem::replace(&mut tenths_shown, tenths) {
                 // If nobody reads it, the download goes on.
-                let _ = writeln!(
-                    io::stderr(),
-                    "log {}: {}",
-                    download.name().unwrap_or_default(),
-                    in_words(&progress)
-                );
+                let (name, words) = (download.name().unwrap_or_default(), in_words(&progress));
+                let _ = writeln!(io::stderr(), "log {name}: {words}");
             }
         }
         if let Some(ended) = download.ended() {

@@ -126,16 +126,12 @@ impl LogWatch {
 pub(super) type GuardedLog = Arc<Mutex<Option<Recorder>>>;
 
 /// Finishes the log when it goes out of scope, also while a panic unwinds.
-pub struct LogGuard(GuardedLog);
+pub struct LogGuard(pub(super) GuardedLog);
 
 impl LogGuard {
     /// Guards a log, if there is one.
     pub fn new(recorder: Option<Recorder>) -> Self {
         Self(Arc::new(Mutex::new(recorder)))
-    }
-
-    pub(super) fn log(&self) -> GuardedLog {
-        Arc::clone(&self.0)
     }
 
     fn take(&self) -> Option<Recorder> {
@@ -176,7 +172,7 @@ const SIGNED_EVERY: Duration = Duration::from_secs(2);
 /// The book of this run.
 pub(super) struct StationBook {
     book: Book,
-    key: Option<BookKey>,
+    pub(super) key: Option<BookKey>,
     /// The last signed end, and when it was signed.
     signed: Option<(Head, Duration)>,
 }
@@ -212,10 +208,6 @@ impl StationBook {
             None => SignedHead { head, signature: [0; 64] },
         };
         Some((signed, Record::BookHead(signed.record())))
-    }
-
-    pub(super) fn is_signed(&self) -> bool {
-        self.key.is_some()
     }
 }
 

@@ -154,7 +154,8 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
         _ => None,
     };
     let header = match &demo_options {
-        Some(options) => options.log_header(clock.start_unix_ns()),
+        // It contains both sides.
+        Some(options) => options.flight.log_header("ground", clock.start_unix_ns()),
         None => LogHeader {
             writer: "ground".to_owned(),
             start_unix_ns: clock.start_unix_ns(),
@@ -163,7 +164,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     };
     let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
-    let next_log = NextLog::new(args, header, log_guard.log());
+    let next_log = NextLog::new(args, header, Arc::clone(&log_guard.0));
     let (mut station, mut model, mut wire) =
         match Box::pin(start(args, config, duty, (clock, demo_options), next_log)).await {
             Ok(started) => started,
@@ -203,7 +204,7 @@ async fn start(
     mut next_log: NextLog,
 ) -> anyhow::Result<(Station, Model, Wire)> {
     let Duty { is_daemon, interactive, time_limit, json } = duty;
-    let recorder = next_log.present();
+    let recorder = next_log.guarded().clone();
     let link = &args.flags.link;
     // The demonstration uses any free port, so that it can run beside a real ground station.
     let mut endpoints = link.connect.clone();

@@ -31,6 +31,7 @@ const LONG_BYTES: u64 = 512 << 20;
 const AGAIN_AFTER: Duration = Duration::from_hours(1);
 
 /// What the next log needs.
+#[derive(Default)]
 pub(super) struct NextLog {
     /// The name that was given.
     name: Option<LogChoice>,
@@ -48,32 +49,13 @@ pub(super) struct NextLog {
 
 impl NextLog {
     pub(super) fn new(args: &StationArgs, header: LogHeader, guarded: GuardedLog) -> Self {
-        let name = args.flags.log.clone();
-        Self {
-            name,
-            header,
-            book_key: None,
-            guarded,
-            not_before: Duration::ZERO,
-            begins: false,
-            ending: None,
-        }
+        Self { name: args.flags.log.clone(), header, guarded, ..Self::default() }
     }
 
     /// The log that is written; `None` if none is wanted.
-    pub(super) fn present(&self) -> Option<Recorder> {
-        self.guarded().clone()
-    }
-
-    fn guarded(&self) -> MutexGuard<'_, Option<Recorder>> {
+    pub(super) fn guarded(&self) -> MutexGuard<'_, Option<Recorder>> {
         self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Writes the end of a log in a thread of its own, because the disk may be slow.
-fn end(log: Recorder) -> Option<Receiver<Result<(), RecorderError>>> {
-    // Without the thread the last handle is gone, and the recorder ends the log by itself.
-    in_a_thread("log end", move || log.finish().map(drop)).ok()
 }
 
 fn file_name(path: &Path) -> String {
@@ -139,6 +121,9 @@ impl Station {
         let before = self.next_log.guarded().replace(next.clone());
         wire.recorder = Some(next.clone());
         (self.recorder, self.log_watch) = (Some(next.clone()), LogWatch::default());
+        // In a thread, because the disk may be slow. Without one the last handle is dropped,
+        // and the recorder ends the log by itself.
+        let end = |log: Recorder| in_a_thread("log end", move || log.finish().map(drop)).ok();
         self.next_log.ending = before.and_then(end);
         self.open_book(model, &format!(", after {before_name}{end_of_book}"));
         let path = |path: &Path| absolute(&path.display().to_string());
@@ -215,7 +200,7 @@ mod tests {
             let header = LogHeader { start_unix_ns: clock.start_unix_ns(), ..LogHeader::default() };
             let guard = LogGuard::new(open_log(args.flags.log.as_ref(), true, &header).unwrap());
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
-            let next_log = NextLog::new(&args, header, guard.log());
+            let next_log = NextLog::new(&args, header, std::sync::Arc::clone(&guard.0));
             let config = Config::default();
             let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
             let (mut station, mut model, mut wire) = started.unwrap();

@@ -13,7 +13,6 @@ use protocol::log::recorder::RecorderError;
 use protocol::program::{Exit, is_quiet};
 use serde_json::json;
 
-use super::programs::VoiceEnded;
 use super::screen::Screen;
 use crate::config::Config;
 use crate::model::{Ending, Event, FlightSoFar, Model, Speaker, Verdict};
@@ -77,9 +76,9 @@ impl Output {
         }
     }
 
-    /// Does an action that is a screen's own. Returns why nothing can be called out any more, once.
-    pub(super) fn act(&mut self, action: &Action) -> Option<VoiceEnded> {
-        let screen = self.screen.as_mut()?;
+    /// Does an action that is a screen's own.
+    pub(super) fn act(&mut self, action: &Action, model: &mut Model, now: Duration) {
+        let Some(screen) = &mut self.screen else { return };
         match action {
             Action::Redraw => screen.clear(),
             Action::NextTheme => {
@@ -87,10 +86,11 @@ impl Output {
                 screen.pace.mark_changed();
             }
             Action::Bell => screen.bell(),
-            Action::Say(text) => return screen.say(text),
+            Action::Say(text) if screen.say(text) => {
+                model.warn(now, "the voice command has ended; nothing is called out any more");
+            }
             _ => {}
         }
-        None
     }
 
     /// Lets time pass for the model's view of the terminal.
@@ -141,7 +141,7 @@ impl Lines {
         let mut text = String::new();
         let shown = |event: &&Event| !model.settings.demonstration || is_of_the_flight(event);
         for event in model.events.since(self.seen).filter(shown) {
-            let (time_s, speaker, mark) = (event.at.as_secs_f64(), event.speaker.name(), event.mark());
+            let (time_s, speaker, mark) = (event.at.as_secs_f64(), event.speaker, event.mark());
             // Writing into a String cannot fail.
             let _ = writeln!(text, "{time_s:9.3}  {speaker:<7}  {mark}{}", event.text);
         }

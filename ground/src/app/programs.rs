@@ -12,16 +12,7 @@ const WAITING_MAX: usize = 4;
 /// Passes lines to the command from a thread of its own, so that a command that hangs delays
 /// nothing.
 #[derive(Debug)]
-pub struct Voice {
-    lines: SyncSender<String>,
-    #[cfg(test)]
-    thread: std::thread::JoinHandle<()>,
-}
-
-/// The command has ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the voice command has ended; nothing is called out any more")]
-pub struct VoiceEnded;
+pub struct Voice(SyncSender<String>);
 
 impl Voice {
     /// Starts the command: its name and arguments, with spaces between them.
@@ -38,27 +29,15 @@ impl Voice {
             .stderr(Stdio::null())
             .spawn()?;
         let (lines, waiting) = sync_channel(WAITING_MAX);
-        let thread = std::thread::Builder::new().name("voice".to_owned());
-        let thread = thread.spawn(move || speak(child, &waiting))?;
-        // It is never joined, because it may hang with the command.
-        #[cfg(not(test))]
-        drop(thread);
-        Ok(Self {
-            lines,
-            #[cfg(test)]
-            thread,
-        })
+        // Its end is not awaited, because the thread may hang with the command.
+        in_a_thread("voice", move || speak(child, &waiting))?;
+        Ok(Self(lines))
     }
 
-    /// Says a line, unless the command is too far behind. It never waits.
-    ///
-    /// # Errors
-    /// The command has ended.
-    pub fn say(&self, line: &str) -> Result<(), VoiceEnded> {
-        match self.lines.try_send(format!("{line}\n")) {
-            Ok(()) | Err(TrySendError::Full(_)) => Ok(()),
-            Err(TrySendError::Disconnected(_)) => Err(VoiceEnded),
-        }
+    /// Says a line, unless the command is too far behind. It never waits. Returns false once the
+    /// command has ended.
+    pub fn say(&self, line: &str) -> bool {
+        !matches!(self.0.try_send(format!("{line}\n")), Err(TrySendError::Disconnected(_)))
     }
 }
 
@@ -77,22 +56,16 @@ fn speak(mut child: Child, lines: &Receiver<String>) {
 // Runs the command that reports an alarm to people who are not at the screen.
 
 /// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, in a thread: the
-/// disk may be slow to start it. The result arrives if it cannot be started.
+/// disk may be slow to start it. The receiver gets the error if it cannot be started.
 ///
 /// # Errors
 /// No thread can be started.
-pub(super) fn run_alarm_command(command: &str, alarm: &str) -> io::Result<Receiver<io::Error>> {
+pub(super) fn run_alarm_command(command: &str, alarm: &str) -> io::Result<Receiver<Option<io::Error>>> {
     let mut shell = Command::new("sh");
     shell.args(["-c", command]).env("TOUCHDOWN_ALARM", alarm);
     shell.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
-    let (failed, failure) = sync_channel(1);
-    let run = move || match shell.spawn() {
-        // Waiting only prevents a zombie process; the result is ignored.
-        Ok(mut child) => _ = child.wait(),
-        // The station may have ended.
-        Err(error) => _ = failed.send(error),
-    };
-    std::thread::Builder::new().name("alarm command".to_owned()).spawn(run).map(|_| failure)
+    // Waiting only prevents a zombie process; its result is ignored.
+    in_a_thread("alarm command", move || shell.spawn().map(|mut child| child.wait()).err())
 }
 
 // Writes the report of the flight: runs `replay report` on the station's log.
@@ -111,19 +84,11 @@ pub(super) fn in_a_thread<T: Send + 'static>(
     std::thread::Builder::new().name(name.to_owned()).spawn(work).map(|_| told)
 }
 
-/// A report that is being written: where it is, or why it is not.
-pub(super) type Writing = Receiver<Result<String, String>>;
-
-/// Starts to write the report beside the log; `replay` gives it a name that is free.
+/// Writes the report beside the log; `replay` gives it a name that is free. Returns its path.
 ///
 /// # Errors
-/// No thread can be started.
-pub(super) fn begin_report(log: &Path) -> Result<Writing, String> {
-    let log = log.to_owned();
-    in_a_thread("report", move || write_report(&log)).map_err(|error| error.to_string())
-}
-
-fn write_report(log: &Path) -> Result<String, String> {
+/// `replay` cannot be started, or its last line.
+pub(super) fn write_report(log: &Path) -> Result<String, String> {
     // The program beside this one, otherwise the one that the shell would find.
     let beside = std::env::current_exe().ok().map(|own| own.with_file_name("replay"));
     let program = beside.filter(|program| program.exists()).unwrap_or_else(|| PathBuf::from("replay"));
@@ -149,12 +114,12 @@ mod voice_tests {
         let heard = folder.path().join("heard");
         let voice = Voice::start(&format!("tee {}", heard.display())).unwrap();
         for line in ["liftoff", "$(reboot); `x` | y"] {
-            assert_eq!(voice.say(line), Ok(()));
+            assert!(voice.say(line));
         }
-        let Voice { lines, thread } = voice;
-        drop(lines);
-        thread.join().unwrap();
-        assert_eq!(std::fs::read_to_string(heard).unwrap(), "liftoff\n$(reboot); `x` | y\n");
+        drop(voice);
+        while std::fs::read_to_string(&heard).unwrap_or_default() != "liftoff\n$(reboot); `x` | y\n" {
+            std::thread::yield_now();
+        }
     }
 
     /// More than a pipe holds; a call that waited would never return.
@@ -162,7 +127,7 @@ mod voice_tests {
     fn a_command_that_never_reads_delays_nothing() {
         let voice = Voice::start("sleep 3").unwrap();
         for _ in 0..100_000 {
-            let _ = voice.say("150 metres");
+            voice.say("150 metres");
         }
     }
 
@@ -171,10 +136,10 @@ mod voice_tests {
         assert!(Voice::start("no-such-command-anywhere").is_err());
         assert!(Voice::start(" ").is_err());
         let voice = Voice::start("true").unwrap();
-        while voice.say("anybody there?").is_ok() {
+        while voice.say("anybody there?") {
             std::thread::yield_now();
         }
-        assert_eq!(voice.say("nobody"), Err(VoiceEnded));
+        assert!(!voice.say("nobody"));
     }
 }
 
@@ -187,7 +152,7 @@ mod report_tests {
         let folder = tempfile::tempdir().unwrap();
         let log = folder.path().join("flight.mcap");
         std::fs::write(folder.path().join("flight.html"), "").unwrap();
-        let told = begin_report(&log).unwrap().recv().unwrap();
+        let told = write_report(&log);
         assert!(told.is_err(), "there is no such log: {told:?}");
         assert_eq!(std::fs::read_to_string(folder.path().join("flight.html")).unwrap(), "");
     }

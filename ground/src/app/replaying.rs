@@ -112,8 +112,9 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
                 if actions.contains(&Action::Quit) || matches!(msg, Msg::Terminate(_)) {
                     return Ok(());
                 }
+                let now = player.position();
                 for action in actions {
-                    output.act(&action);
+                    output.act(&action, &mut player.model, now);
                 }
             }
             _ = steps.tick() => {

@@ -28,7 +28,7 @@ use rustix::termios::QueueSelector;
 
 use super::answers;
 use super::pace::Pace;
-use super::programs::{Voice, VoiceEnded, in_a_thread};
+use super::programs::{Voice, in_a_thread};
 use super::terminal::DiffBackend;
 use crate::cli::Characters;
 use crate::config::Config;
@@ -141,11 +141,9 @@ impl Screen {
         self.pace.mark_changed();
     }
 
-    /// Calls a text out. Returns why nothing can be called out any more, once.
-    pub fn say(&mut self, text: &str) -> Option<VoiceEnded> {
-        let ended = self.voice.as_ref()?.say(text).err();
-        self.voice = self.voice.take().filter(|_| ended.is_none());
-        ended
+    /// Calls a text out. Returns whether it was found that the voice command has ended.
+    pub fn say(&mut self, text: &str) -> bool {
+        self.voice.take_if(|voice| !voice.say(text)).is_some()
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.
@@ -267,7 +265,7 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
 /// shows nothing about the line behind it.
 fn is_answered_by_another() -> bool {
     let is_set = |name: &&str| std::env::var_os(name).is_some();
-    ["TMUX", "STY"].iter().any(|name| is_set(&name)) && is_set(&"SSH_CONNECTION")
+    ["TMUX", "STY"].iter().any(is_set) && is_set(&"SSH_CONNECTION")
 }
 
 /// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.

@@ -51,11 +51,11 @@ pub(super) struct Station {
     pub(super) own: Answers,
     pub(super) alarm_command: Option<String>,
     /// Why the newest alarm command could not be started, if so.
-    pub(super) alarm_failure: Option<Receiver<std::io::Error>>,
+    pub(super) alarm_failure: Option<Receiver<Option<std::io::Error>>>,
     /// A file for the next run could not be written, which was reported.
     pub(super) not_saved: bool,
-    /// The report that is being written.
-    pub(super) report: Option<programs::Writing>,
+    /// The report that is being written: its path, or why there is none.
+    pub(super) report: Option<Receiver<Result<String, String>>>,
     /// Who did what; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// The file of the checklist's signatures; `None` without a checklist.
@@ -242,20 +242,16 @@ impl Station {
         match news {
             ServerEvent::ScreenJoined { seat, watch } => {
                 self.screens.push(Attached { seat, watch, answers: Answers::default() });
-                Vec::new()
             }
-            ServerEvent::ScreenLeft(number) => {
-                self.screens.retain(|screen| screen.seat.screen != number);
-                Vec::new()
+            ServerEvent::ScreenLeft(number) => self.screens.retain(|screen| screen.seat.screen != number),
+            ServerEvent::FromScreen(by, ToStation::Request(request)) => {
+                return vec![Msg::Asked { request, by }];
             }
-            ServerEvent::FromScreen(by, ToStation::Request(request)) => vec![Msg::Asked { request, by }],
             ServerEvent::FromScreen(by, ToStation::Here) => {
                 self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.hear());
-                Vec::new()
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
-                Vec::new()
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
                 let told = stations::stopping(model, force, self.clock.now());
@@ -264,14 +260,16 @@ impl Station {
                 self.record_operator("stop", &operator, format!("asked for by {operator}: {ending}"));
                 // The asking process may be gone; the station ends in any case.
                 let _ = answer.send(told);
-                if stops { vec![Msg::Terminate("ground stop")] } else { Vec::new() }
+                if stops {
+                    return vec![Msg::Terminate("ground stop")];
+                }
             }
             ServerEvent::Question(_, answer) => {
                 let _ = answer.send(ToScreen::Status(stations::of(model, &self.screens)));
-                Vec::new()
             }
-            ServerEvent::FromScreen(..) => Vec::new(),
+            ServerEvent::FromScreen(..) => {}
         }
+        Vec::new()
     }
 
     fn record_operator(&mut self, kind: &str, who: &str, detail: String) {
@@ -297,7 +295,7 @@ impl Station {
 
     /// Takes the outcomes of what runs beside the loop.
     pub(super) fn take_outcomes(&mut self, model: &mut Model, wire: &mut Wire) {
-        if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()) {
+        if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()?) {
             self.give_up_alarm_command(&error);
         }
         let now = self.clock.now();
@@ -375,9 +373,7 @@ impl Station {
                     }
                 }
                 Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
-                    if let Some(ended) = self.output.act(&action) {
-                        model.warn(now, ended.to_string());
-                    }
+                    self.output.act(&action, model, now);
                 }
                 Action::Alarm(words) => self.tell_alarm(&words),
                 Action::WriteReport => self.write_report(model, now),
@@ -393,11 +389,10 @@ impl Station {
     }
 
     fn write_report(&mut self, model: &mut Model, now: Duration) {
-        let log = self.recorder.as_ref().map(|recorder| recorder.path().to_owned());
-        match log.map(|log| programs::begin_report(&log)) {
-            Some(Ok(writing)) => self.report = Some(writing),
-            Some(Err(why)) => model.warn(now, format!("no report: {why}")),
-            None => {}
+        let Some(log) = self.recorder.as_ref().map(|recorder| recorder.path().to_owned()) else { return };
+        match programs::in_a_thread("report", move || programs::write_report(&log)) {
+            Ok(writing) => self.report = Some(writing),
+            Err(why) => model.warn(now, format!("no report: {why}")),
         }
     }
 
@@ -462,7 +457,7 @@ impl Station {
         self.book = Some(book);
         self.record(first);
         for (name, role) in &model.settings.crew_roles {
-            let text = role_name(*role).to_owned();
+            let text = role_name(*role);
             self.enter(&BookLine { kind: "crew".to_owned(), who: name.clone(), text });
         }
     }
@@ -479,7 +474,7 @@ impl Station {
     fn sign_book(&mut self, at_once: bool) -> Option<Msg> {
         let now = self.clock.now();
         let book = self.book.as_mut()?;
-        let is_signed = book.is_signed();
+        let is_signed = book.key.is_some();
         let (head, record) = book.sign(now, at_once)?;
         self.record(record);
         Some(Msg::Book { head, is_signed })

@@ -31,7 +31,7 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
     let vehicle = &model.vehicle;
     let kind = match settings.demonstration {
         true => "DEMO",
-        false if vehicle.is_simulated() => "SIM",
+        false if vehicle.boot.is_simulated() => "SIM",
         false => "LIVE",
     };
     let watching =

@@ -317,11 +317,8 @@ impl Wire {
     pub fn save_timestamps(&mut self) -> Option<Msg> {
         let failed = self.links.save_timestamps().err();
         let was_said = std::mem::replace(&mut self.save_failure_reported, failed.is_some());
-        failed.filter(|_| !was_said).map(|why| {
-            Msg::LinkSays(format!(
-                "signing time stamps are not saved, so frames could be replayed later: {why}"
-            ))
-        })
+        let what = "signing time stamps are not saved, so frames could be replayed later";
+        failed.filter(|_| !was_said).map(|why| Msg::LinkSays(format!("{what}: {why}")))
     }
 
     fn now(&self) -> Now {

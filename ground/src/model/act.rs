@@ -278,10 +278,6 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
     let typed = typed.to_lowercase();
     let fits =
         |entry: &PaletteEntry| typed.split_whitespace().all(|word| entry.words.to_lowercase().contains(word));
-    every_entry(model, now).filter(fits).collect()
-}
-
-fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntry> {
     let entry = |words: String, key: String, action| PaletteEntry { words, key, action };
     let abort = entry(ABORT_WORDS.to_owned(), "Ctrl-X".to_owned(), PaletteAction::TellAbort);
     let acts = DEFINITIONS.iter().map(move |Definition { act, key, words, .. }| {
@@ -297,7 +293,7 @@ fn every_entry(model: &Model, now: Duration) -> impl Iterator<Item = PaletteEntr
     let plots = quantity::ALL.iter().map(move |quantity| {
         entry(format!("plot {}", quantity.name), String::new(), PaletteAction::Plot(quantity))
     });
-    std::iter::once(abort).chain(choices).chain(acts).chain(plots)
+    std::iter::once(abort).chain(choices).chain(acts).chain(plots).filter(fits).collect()
 }
 
 #[cfg(test)]

@@ -119,7 +119,7 @@ pub struct Alarms {
 impl Alarms {
     /// The history has been received. Alarms that ended in it are past; alarms that still hold
     /// ring.
-    pub(crate) fn history_ends(&mut self) {
+    pub fn history_ends(&mut self) {
         if std::mem::take(&mut self.in_history) {
             for alarm in &mut self.list {
                 alarm.past = !alarm.is_active();

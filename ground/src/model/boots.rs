@@ -12,7 +12,7 @@ use std::time::Duration;
 use protocol::dialect::TdPhase;
 use protocol::identity::LARGEST_BOOT_NUMBER;
 
-use super::{Foreign, KeepAway, Model, Vehicle, words};
+use super::{KeepAway, Model, Vehicle, foreign_name, words};
 
 /// Messages of a slow and a fast link mix: a vehicle's clock, ms, may go back by this much.
 const REORDERED_MS: i64 = 5_000;
@@ -119,12 +119,6 @@ fn is_within(at: Duration, limit: Duration, now: Duration) -> bool {
 }
 
 impl HeardBoot {
-    fn new(id: BootId, report: &StatusReport, now: Duration) -> Self {
-        let mut boot = Self { id, uid: report.uid, number: report.boot, ..Self::default() };
-        boot.hear(report, now);
-        boot
-    }
-
     /// Whether this is its number, as far as a heartbeat has room for it.
     fn is_number(&self, number: u32) -> bool {
         (self.number ^ number) & LARGEST_BOOT_NUMBER == 0
@@ -192,13 +186,9 @@ impl HeardBoot {
         self.sources.iter().map(|source| i64::from(sequence.wrapping_sub(source.sequence))).min().unwrap_or(0)
     }
 
-    /// When it began, and what its clock has shown last, ms on our clock.
+    /// When it began, ms on our clock.
     fn began_ms(&self) -> i64 {
         self.sources.iter().map(|source| source.began_ms).min().unwrap_or(0)
-    }
-
-    fn said_ms(&self) -> i64 {
-        self.began_ms() + i64::from(self.clock_ms)
     }
 
     fn is_at(&self, source: u16) -> bool {
@@ -211,7 +201,8 @@ impl HeardBoot {
 
     /// Whether it may be the same vehicle after its next power-up.
     fn follows(&self, former: &Self) -> bool {
-        self.uid == former.uid && self.began_ms() + OVERLAP_MS >= former.said_ms()
+        self.uid == former.uid
+            && self.began_ms() + OVERLAP_MS >= former.began_ms() + i64::from(former.clock_ms)
     }
 
     fn is_steady(&self, now: Duration) -> bool {
@@ -276,13 +267,10 @@ impl Boots {
     /// have one boot and unique id.
     pub fn disowns(&mut self, report: &StatusReport, now: Duration) -> bool {
         let shown = self.shown;
-        let boot = self.list.iter_mut().find(|boot| Some(boot.id) == shown);
-        let Some(boot) = boot.filter(|boot| boot.fits(report, now) && boot.is_out_of_step(report, now))
-        else {
-            return false;
+        let claims = |boot: &&mut HeardBoot| {
+            Some(boot.id) == shown && boot.fits(report, now) && boot.is_out_of_step(report, now)
         };
-        boot.contradict(now);
-        true
+        self.list.iter_mut().find(claims).map(|boot| boot.contradict(now)).is_some()
     }
 
     /// Takes a flight status, and says which boot it comes from. The first one is shown.
@@ -301,7 +289,9 @@ impl Boots {
                 .min_by_key(|place| (self.list[*place].is_busy, self.list[*place].heard_at));
             self.list.remove(oldest.unwrap_or(0));
         }
-        self.list.push(HeardBoot::new(id, report, now));
+        let mut boot = HeardBoot { id, uid: report.uid, number: report.boot, ..HeardBoot::default() };
+        boot.hear(report, now);
+        self.list.push(boot);
         self.shown.get_or_insert(id);
         id
     }
@@ -348,9 +338,7 @@ impl Boots {
 
     /// Notes whether a boot is armed, in a countdown, in flight, or down and not yet safe.
     pub fn note(&mut self, id: BootId, is_busy: bool) {
-        if let Some(boot) = self.list.iter_mut().find(|boot| boot.id == id) {
-            boot.is_busy = is_busy;
-        }
+        self.list.iter_mut().filter(|boot| boot.id == id).for_each(|boot| boot.is_busy = is_busy);
     }
 
     /// Decides which boot is shown. Returns the one that takes the screen.
@@ -422,7 +410,7 @@ impl Model {
     pub fn beside(&self, now: Duration) -> Option<String> {
         let is_heard = |at: Duration| is_within(at, GONE_AFTER, now);
         let ours = self.vehicle.status.as_ref().is_some_and(|status| is_heard(status.received_at));
-        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.heard_at));
+        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.received_at));
         let words = self.boots.beside(now).into_iter().map(|other| match other {
             Beside::Boot(_, 0) => "one without a boot number".to_owned(),
             Beside::Boot(id, boot) => {
@@ -432,7 +420,7 @@ impl Model {
             }
             Beside::Twin => "another one with the same boot and unique id".to_owned(),
         });
-        let words: Vec<String> = words.chain(foreign.map(Foreign::name)).collect();
+        let words: Vec<String> = words.chain(foreign.map(foreign_name)).collect();
         (!words.is_empty()).then(|| words.join(", "))
     }
 

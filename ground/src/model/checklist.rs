@@ -4,12 +4,11 @@
 //! The station keeps it; every screen of the station shows the same. The vehicle is not armed from
 //! here before every step is done.
 
-use std::fmt::Write as _;
 use std::time::Duration;
 
 use protocol::dialect::TdRole;
+use protocol::mission::MissionHash;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use super::{
     FlownMission, Model,
@@ -28,8 +27,7 @@ pub struct Checklist {
     pub name: String,
     /// The name of the only mission that it is for, as the vehicle tells it; `None` for any.
     pub mission: Option<String>,
-    /// The first sixteen hexadecimal digits of the SHA-256 of its text. Signatures count for this
-    /// text only.
+    /// The hash of its text, as of a mission's. Signatures count for this text only.
     pub hash: String,
     pub steps: Vec<Step>,
 }
@@ -270,8 +268,6 @@ impl Model {
 pub const SIGNED_FOR_S: u64 = 12 * 3_600;
 /// How far ahead of the clock a signature may be: clocks of laptops differ.
 const AHEAD_MAX_S: u64 = 600;
-/// Bytes of a checklist's hash.
-const HASH_BYTES: usize = 8;
 
 /// The file as it is written.
 #[derive(Debug, Deserialize)]
@@ -309,17 +305,8 @@ pub fn parse_checklist(text: &str) -> anyhow::Result<Checklist> {
     Ok(Checklist {
         name: words::printable(&written.name, WORDS_MAX),
         mission: written.mission,
-        hash: hash_of(text),
+        hash: MissionHash::of(text).to_string(),
         steps,
-    })
-}
-
-/// The beginning of the SHA-256, as hexadecimal digits.
-fn hash_of(text: &str) -> String {
-    Sha256::digest(text).iter().take(HASH_BYTES).fold(String::new(), |mut digits, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(digits, "{byte:02x}");
-        digits
     })
 }
 

@@ -11,7 +11,7 @@ use strum::VariantArray;
 
 use super::{
     Ask, FlownMission, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle,
-    is_on_pad, words,
+    foreign_name, is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little
@@ -45,10 +45,14 @@ pub enum CommandKind {
 }
 
 /// A command as a row of their table.
-pub(crate) struct CommandRow {
-    name: &'static str,
-    mav: (MavCmd, f32),
-    moves: bool,
+pub struct CommandRow {
+    /// The name on screens and in the log.
+    pub name: &'static str,
+    /// The MAVLink command and its first parameter.
+    pub mav: (MavCmd, f32),
+    /// Whether it can make something move or light: then it names the boot that it is meant for,
+    /// and is sent only to the vehicle that is shown.
+    pub(crate) moves: bool,
     /// How often the command is resent.
     pub(crate) resend: Resend,
     /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its
@@ -64,7 +68,7 @@ impl CommandKind {
     /// A repetition has the number of the command, and the vehicle does it once: a late one arms
     /// nothing that was disarmed since. A tap is for one moment. A check is not repeated either: it
     /// would move what somebody has just laid hands on.
-    pub(crate) fn row(self) -> CommandRow {
+    pub fn row(self) -> CommandRow {
         use MavCmd::{
             MAV_CMD_COMPONENT_ARM_DISARM as ARM, MAV_CMD_DO_FLIGHTTERMINATION as TERMINATE,
             MAV_CMD_DO_PAUSE_CONTINUE as PAUSE, MAV_CMD_MISSION_START as START,
@@ -87,22 +91,6 @@ impl CommandKind {
             Self::EndCheck => row("END OF CHECK", (CHECK, 0.0), false, Times(3), None),
             Self::Seen => row("SEEN", (CHECK, 3.0), true, Never, None),
         }
-    }
-
-    /// The name on screens and in the log.
-    pub fn name(self) -> &'static str {
-        self.row().name
-    }
-
-    /// The MAVLink command and its first parameter.
-    pub fn mav_command(self) -> (MavCmd, f32) {
-        self.row().mav
-    }
-
-    /// Whether it can make something move or light: then it names the boot that it is meant for,
-    /// and is sent only to the vehicle that is shown.
-    pub fn moves(self) -> bool {
-        self.row().moves
     }
 
     /// Whether only the owner of the station's key gives it: everything but what anybody may do to
@@ -196,6 +184,12 @@ impl TrackedCommand {
         self.acknowledged == Acknowledgement::Answered(MavResult::MAV_RESULT_ACCEPTED as u8)
     }
 
+    /// Whether it was refused finally, or accepted and observed.
+    pub(crate) fn is_confirmed(&self) -> bool {
+        let answered = matches!(self.acknowledged, Acknowledgement::Answered(_));
+        answered && (self.observed_at.is_some() || !self.accepted())
+    }
+
     /// Commanded, and neither refused nor given up nor observed.
     pub fn is_on_its_way(&self, now: Duration) -> bool {
         let open = matches!(self.acknowledged, Acknowledgement::Waiting | Acknowledgement::InProgress);
@@ -229,7 +223,7 @@ impl Commands {
 
     /// Whether an abort is still being sent.
     pub fn is_aborting(&self) -> bool {
-        self.sender.is_pending(CommandKind::Abort.mav_command().0)
+        self.sender.is_pending(CommandKind::Abort.row().mav.0)
     }
 }
 
@@ -245,8 +239,8 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
             format!("TWO VEHICLES under id {}: switch one off", of.system_id)
         }
-        Some(foreign) if now.saturating_sub(foreign.heard_at) < GONE_AFTER => {
-            format!("not a Touchdown vehicle: {}", foreign.name())
+        Some(foreign) if foreign.age(now) < GONE_AFTER => {
+            format!("not a Touchdown vehicle: {}", foreign_name(foreign))
         }
         _ if vehicle.status.is_none() => {
             "it is not known yet what the vehicle is: it has sent no flight status".to_owned()
@@ -325,7 +319,7 @@ pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
 /// once the crew goes on nevertheless.
 pub fn why_untested(model: &Model) -> Option<String> {
     let boot = model.vehicle.boot.number();
-    if model.vehicle.is_simulated() || (boot.is_some() && model.untested == boot) {
+    if model.vehicle.boot.is_simulated() || (boot.is_some() && model.untested == boot) {
         return None;
     }
     match model.vehicle.mission() {
@@ -421,10 +415,6 @@ pub fn why_other_mission(model: &Model) -> Option<String> {
 
 // How far the automatic mode has come.
 
-/// After a temporary refusal, what the vehicle says about its checks is believed again only after
-/// this.
-const RETRY_AFTER: Duration = Duration::from_secs(1);
-
 /// The steps of the automatic mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AutoStep {
@@ -441,17 +431,5 @@ pub(crate) enum AutoStep {
 impl Default for AutoStep {
     fn default() -> Self {
         Self::WaitForReady { not_before: Duration::ZERO }
-    }
-}
-
-impl AutoStep {
-    /// The vehicle has temporarily refused to arm. Returns whether the automatic mode will command
-    /// it again once the checks pass, as a new command and never by resending the old frame.
-    pub(crate) fn retry_after_refusal(&mut self, now: Duration) -> bool {
-        let retries = *self == Self::WaitForArmed;
-        if retries {
-            *self = Self::WaitForReady { not_before: now + RETRY_AFTER };
-        }
-        retries
     }
 }

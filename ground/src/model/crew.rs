@@ -7,7 +7,7 @@ use std::time::Duration;
 use protocol::dialect::{TD_CREW_DATA, TdAct, TdRole};
 use serde::{Deserialize, Serialize};
 
-use super::{Model, why_not_seat};
+use super::{Model, why_not_seat, words};
 
 /// How long a countdown may continue without a commanding screen that answers. The vehicle is to be
 /// held 1 s after the last one has gone: the rest is for the hold and its way.
@@ -76,10 +76,10 @@ impl Crew {
         };
         match &self.silent[..] {
             [] => there,
-            silent => format!(
-                "{there}; does not answer or is not shown (tmux), so it does not count: {}",
-                listed(silent)
-            ),
+            silent => {
+                let why = "does not answer or is not shown (tmux), so it does not count";
+                format!("{there}; {why}: {}", listed(silent))
+            }
         }
     }
 }
@@ -153,13 +153,9 @@ impl Ask {
     }
 }
 
-pub fn role_name(role: TdRole) -> &'static str {
-    match role {
-        TdRole::TD_ROLE_OBSERVER => "OBSERVER",
-        TdRole::TD_ROLE_RANGE_SAFETY => "RANGE SAFETY",
-        TdRole::TD_ROLE_FLIGHT => "FLIGHT",
-        TdRole::TD_ROLE_PAD => "PAD",
-    }
+/// As in `RANGE SAFETY`.
+pub fn role_name(role: TdRole) -> String {
+    words::without_prefix(&role, "TD_ROLE_").replace('_', " ")
 }
 
 impl Model {

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use protocol::dialect::{TdChute, TdHold, TdPhase};
 
-use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Vehicle, is_burning};
+use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Spot, Vehicle, is_burning};
 
 /// Error of the last position, m: usual for a satellite receiver.
 const POSITION_ERROR_M: f64 = 1.5;
@@ -35,14 +35,10 @@ const LATE_S: f64 = 2.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PredictedPosition {
-    /// North of the pad, m.
-    pub x_m: f64,
-    /// East of the pad, m.
-    pub y_m: f64,
+    /// Position over the ground with the radius of the error circle.
+    pub spot: Spot,
     /// Never below the ground.
     pub altitude_m: f64,
-    /// The radius of the error circle, m.
-    pub error_m: f64,
     /// Time since the last position.
     pub age: Duration,
     pub basis: Basis,
@@ -73,12 +69,10 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     let wrong_m_s2 = acceleration_error_m_s2(vehicle, phase, expected.basis);
     let swerved_m = swerve_m(expected.burning_s);
     let grown_m = SPEED_ERROR_M_S * growing_s + 0.5 * wrong_m_s2 * growing_s * growing_s + swerved_m;
-    let [x_m, y_m, altitude_m] = expected.place;
+    let [north_m, east_m, altitude_m] = expected.place;
     Some(PredictedPosition {
-        x_m,
-        y_m,
+        spot: Spot { north_m, east_m, error_m: POSITION_ERROR_M + grown_m + expected.or_else_m },
         altitude_m: altitude_m.max(0.0),
-        error_m: POSITION_ERROR_M + grown_m + expected.or_else_m,
         age,
         basis: expected.basis,
         is_down: down_after_s.is_some_and(|down_s| seconds > down_s),
@@ -89,11 +83,13 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
 const COURSE_STEP_S: f64 = 0.5;
 const COURSE_LONGEST_S: f64 = 120.0;
 
-/// Where the vehicle is expected to be: times from now, s, and places, to the ground as far as that
-/// can be told. On the way up only to apogee: nobody has told yet how it falls. Under the ascent
-/// motor, whose thrust is not known, and under a parachute that still fills, nothing.
-pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
+/// Where the vehicle is expected to be: moments and positions, to the ground as far as that can be
+/// predicted. On the way up only to apogee: how it falls is not reported yet. Under the ascent
+/// motor, whose thrust is not known, and under a parachute that still fills, nothing. After a loss
+/// of the link it begins at the last report, so that the predicted touchdown stands still.
+pub fn foreseen(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)> {
     let (Some(motion), Some(phase)) = (vehicle.best_motion(), vehicle.phase_now()) else { return Vec::new() };
+    let from = if is_unheard(vehicle, now) { motion.received_at } else { now };
     let left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
     let untold = match phase {
         TdPhase::TD_PHASE_CHUTE => !is_carried(vehicle),
@@ -103,11 +99,11 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
         return Vec::new();
     }
     let last = LastMotion::of(vehicle, phase, &motion.value);
-    let age_s = motion.age(now).as_secs_f64();
-    let mut course: Vec<(f64, NorthEastUp)> = Vec::new();
+    let age_s = motion.age(from).as_secs_f64();
+    let mut course: Vec<(Duration, NorthEastUp)> = Vec::new();
     for step in 0..(COURSE_LONGEST_S / COURSE_STEP_S) as u32 {
         let ahead_s = f64::from(step) * COURSE_STEP_S;
-        let planned = along_plan(vehicle, phase, now + Duration::from_secs_f64(ahead_s));
+        let planned = along_plan(vehicle, phase, from + Duration::from_secs_f64(ahead_s));
         let planned = planned.map(|at| (at.place, at.landed_after_s));
         let ([x_m, y_m, altitude_m], landed_after_s) = planned.unwrap_or_else(|| {
             let (place, landed_after_s, _) = last.follow(age_s + ahead_s);
@@ -117,24 +113,13 @@ pub fn course(vehicle: &Vehicle, now: Duration) -> Vec<(f64, NorthEastUp)> {
         if phase == TdPhase::TD_PHASE_COAST && falls {
             break;
         }
-        course.push((
-            landed_after_s.map_or(ahead_s, |landed_s| (landed_s - age_s).clamp(0.0, ahead_s)),
-            [x_m, y_m, altitude_m.max(0.0)],
-        ));
+        let at_s = landed_after_s.map_or(ahead_s, |landed_s| (landed_s - age_s).clamp(0.0, ahead_s));
+        course.push((from + Duration::from_secs_f64(at_s), [x_m, y_m, altitude_m.max(0.0)]));
         if landed_after_s.is_some() {
             break;
         }
     }
     course
-}
-
-/// The same with the moments. After a loss of the link it begins where the vehicle was last
-/// heard, so that the predicted touchdown stands still.
-pub fn foreseen(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)> {
-    let heard_at = vehicle.best_motion().map(|motion| motion.received_at);
-    let from = heard_at.filter(|_| is_unheard(vehicle, now)).unwrap_or(now);
-    let points = course(vehicle, from).into_iter();
-    points.map(|(ahead_s, place)| (from + Duration::from_secs_f64(ahead_s), place)).collect()
 }
 
 /// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and
@@ -356,20 +341,18 @@ impl LastMotion {
         velocity: &NorthEastUp,
         braking: &mut Option<NorthEastUp>,
     ) -> NorthEastUp {
+        let is_lit = |from_m: f64| place[2] <= from_m && velocity[2] < 0.0;
         match self.forces {
             Forces::Thrust { acceleration_m_s2 } => acceleration_m_s2,
-            Forces::Brake => *braking.get_or_insert_with(|| deceleration_to_rest_m_s2(place, velocity)),
-            Forces::Air { drag_per_m, burn_from_m } => {
-                if braking.is_some()
-                    || burn_from_m.is_some_and(|from_m| place[2] <= from_m && velocity[2] < 0.0)
-                {
-                    return *braking.get_or_insert_with(|| deceleration_to_rest_m_s2(place, velocity));
-                }
+            Forces::Air { drag_per_m, burn_from_m }
+                if braking.is_none() && !burn_from_m.is_some_and(is_lit) =>
+            {
                 let through_air = std::array::from_fn(|axis| velocity[axis] - self.wind_m_s[axis]);
                 let resistance = drag_per_m.unwrap_or(0.0) * size(&through_air);
                 let [north, east, up] = through_air.map(|part: f64| -resistance * part);
                 [north, east, up - GRAVITY_M_S2]
             }
+            _ => *braking.get_or_insert_with(|| deceleration_to_rest_m_s2(place, velocity)),
         }
     }
 }
@@ -460,7 +443,10 @@ mod tests {
     fn val_free_fall_without_drag_and_never_below_the_ground() {
         for vehicle in [falling_freely(), moving(TdPhase::TD_PHASE_COAST, [2.0, 0.0, -20.0], None)] {
             let found = after(&vehicle, 2.0);
-            assert!((found.altitude_m - 40.3867).abs() < 1e-9 && (found.x_m - 5.0).abs() < 1e-9, "{found:?}");
+            assert!(
+                (found.altitude_m - 40.3867).abs() < 1e-9 && (found.spot.north_m - 5.0).abs() < 1e-9,
+                "{found:?}"
+            );
             assert_eq!(after(&vehicle, 60.0).altitude_m.to_bits(), 0);
         }
         assert_eq!(after(&falling_freely(), 2.0).basis, Basis::Fall);
@@ -510,12 +496,12 @@ mod tests {
         vehicle.path = Some(Sample::new(vec![(4.0, 40.0), (2.0, 10.0), (0.0, 0.0)], SEEN));
         assert_eq!(after(&vehicle, 3.0).basis, Basis::Plan);
         assert!((after(&vehicle, 3.0).altitude_m - 5.0).abs() < 1e-9);
-        assert!((after(&vehicle, 3.0).x_m - 1.0).abs() < 1e-9);
+        assert!((after(&vehicle, 3.0).spot.north_m - 1.0).abs() < 1e-9);
         assert!(after(&vehicle, 9.0).altitude_m.abs() < 1e-9);
         // The motion east at 1 m/s stops when the plan ends: 2 m in 4 s.
-        assert!((after(&vehicle, 9.0).y_m - 2.0).abs() < 1e-9);
-        assert!(after(&vehicle, 2.0).error_m < after(&vehicle, 3.0).error_m);
-        assert!(after(&vehicle, 3.0).error_m < after(&vehicle, 9.0).error_m);
+        assert!((after(&vehicle, 9.0).spot.east_m - 2.0).abs() < 1e-9);
+        assert!(after(&vehicle, 2.0).spot.error_m < after(&vehicle, 3.0).spot.error_m);
+        assert!(after(&vehicle, 3.0).spot.error_m < after(&vehicle, 9.0).spot.error_m);
         // The path arrived one second before the time to go, so the vehicle is one second further
         // along.
         let sooner = Duration::from_secs(99);
@@ -532,7 +518,10 @@ mod tests {
         let vehicle = moving(TdPhase::TD_PHASE_POWERED, [0.0, 2.0, -20.0], Some([0.0, -0.5, 3.0]));
         let found = after(&vehicle, 2.0);
         assert_eq!(found.basis, Basis::LastThrust);
-        assert!((found.altitude_m - 66.0).abs() < 1e-9 && (found.y_m - 3.0).abs() < 1e-9, "{found:?}");
+        assert!(
+            (found.altitude_m - 66.0).abs() < 1e-9 && (found.spot.east_m - 3.0).abs() < 1e-9,
+            "{found:?}"
+        );
     }
 
     /// At terminal speed, with the motor to be lit at 50 m: from there, 40 m/s are braked to zero
@@ -550,7 +539,7 @@ mod tests {
         let found = after(&vehicle, 2.5);
         assert_eq!(found.basis, Basis::FallThenBurn);
         assert!((found.altitude_m - 12.5).abs() < 0.5, "{found:?}");
-        assert!(found.error_m > found.altitude_m, "unlit it is on the ground by now");
+        assert!(found.spot.error_m > found.altitude_m, "unlit it is on the ground by now");
         assert!(after(&vehicle, 30.0).altitude_m < 0.5);
         // With an inhibited motor it keeps falling.
         status.interlocks |= protocol::dialect::TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
@@ -574,8 +563,9 @@ mod tests {
     #[test]
     fn val_under_its_canopy_it_keeps_its_sink_and_drifts_with_the_wind() {
         for (sinks_m_s, wind_m_s) in [(6.0, 5.0_f32), (7.0, -3.0)] {
-            let course = course(&carried(sinks_m_s, wind_m_s), SEEN);
-            let (lands_s, [north_m, ..]) = *course.last().expect("a course to the ground");
+            let course = foreseen(&carried(sinks_m_s, wind_m_s), SEEN);
+            let (lands_at, [north_m, ..]) = *course.last().expect("a course to the ground");
+            let lands_s = lands_at.saturating_sub(SEEN).as_secs_f64();
             assert!((lands_s - 100.0 / sinks_m_s).abs() < 0.5, "{lands_s} s");
             assert!((north_m - 1.0 - f64::from(wind_m_s) * lands_s).abs() < 1.0, "{north_m} m");
         }
@@ -587,7 +577,7 @@ mod tests {
         let mut vehicle = carried(30.0, 0.0);
         let fired = TD_DESCENT_DATA { chute: TdChute::TD_CHUTE_FIRED, ..TD_DESCENT_DATA::default() };
         vehicle.keep(&MavMessage::TD_DESCENT(fired), SEEN);
-        assert_eq!(course(&vehicle, SEEN), []);
+        assert_eq!(foreseen(&vehicle, SEEN), []);
     }
 
     proptest! {
@@ -609,8 +599,8 @@ mod tests {
             let expected_m = (100.0 - down_m_s * seconds).max(0.0);
             prop_assert!((found.altitude_m - expected_m).abs() < 1e-3, "{found:?}");
             if expected_m > 0.0 {
-                prop_assert!((found.x_m - 1.0 - wind[0] * seconds).abs() < 1e-3);
-                prop_assert!((found.y_m - wind[1] * seconds).abs() < 1e-3);
+                prop_assert!((found.spot.north_m - 1.0 - wind[0] * seconds).abs() < 1e-3);
+                prop_assert!((found.spot.east_m - wind[1] * seconds).abs() < 1e-3);
             }
         }
 
@@ -630,9 +620,9 @@ mod tests {
             vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
             let at = |seconds: f64| predict_position(&vehicle, SEEN + Duration::from_secs_f64(seconds));
             if let (Some(sooner), Some(later)) = (at(seconds), at(seconds + 0.5)) {
-                prop_assert!(later.x_m.is_finite() && later.y_m.is_finite() && later.altitude_m.is_finite());
-                prop_assert!(sooner.altitude_m >= 0.0 && sooner.error_m > 0.0);
-                prop_assert!(later.error_m >= sooner.error_m || later.basis == Basis::FallThenBurn);
+                prop_assert!(later.spot.north_m.is_finite() && later.spot.east_m.is_finite() && later.altitude_m.is_finite());
+                prop_assert!(sooner.altitude_m >= 0.0 && sooner.spot.error_m > 0.0);
+                prop_assert!(later.spot.error_m >= sooner.spot.error_m || later.basis == Basis::FallThenBurn);
             }
         }
     }

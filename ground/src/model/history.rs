@@ -10,7 +10,7 @@ use super::{
 };
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
-const TIMELINE_MAX: usize = 64;
+pub(crate) const TIMELINE_MAX: usize = 64;
 
 /// What the review page shows.
 #[derive(Debug, Clone, Default)]
@@ -20,14 +20,6 @@ pub struct History {
     /// The longest time without a heartbeat in flight.
     pub silence: Duration,
     pub trace: Trace,
-}
-
-impl History {
-    pub(crate) fn note_phase(&mut self, phase: TdPhase, now: Duration) {
-        if self.timeline.len() < TIMELINE_MAX && self.timeline.last().is_none_or(|(last, _)| *last != phase) {
-            self.timeline.push((phase, now));
-        }
-    }
 }
 
 // Every quantity over time, in a bounded number of rows: the recent past in full, the distant past

@@ -4,11 +4,11 @@
 use std::num::NonZeroU32;
 use std::time::Duration;
 
-use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavType, TdVehicleFlag};
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, TdVehicleFlag};
 use protocol::identity::LARGEST_BOOT_NUMBER;
 pub use protocol::reported::may_be_ours;
 
-use super::{Model, words};
+use super::{Model, Sample, words};
 
 /// What a vehicle tells of itself and its boot.
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,38 +104,14 @@ impl Model {
 // A vehicle with another autopilot: it is shown as what its heartbeat says, and never armed or
 // started from here.
 
-/// What another autopilot tells in its heartbeat.
-#[derive(Debug, Clone)]
-pub struct Foreign {
-    pub autopilot: MavAutopilot,
-    pub mavtype: MavType,
-    pub armed: bool,
-    /// The number of its mode.
-    pub custom_mode: u32,
-    /// The last heartbeat.
-    pub heard_at: Duration,
-}
-
-impl Foreign {
-    pub(crate) fn of(beat: &HEARTBEAT_DATA, now: Duration) -> Self {
-        Self {
-            autopilot: beat.autopilot,
-            mavtype: beat.mavtype,
-            armed: beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED),
-            custom_mode: beat.custom_mode,
-            heard_at: now,
-        }
-    }
-
-    /// As in `ArduPilot quadrotor`.
-    pub fn name(&self) -> String {
-        let autopilot = match self.autopilot {
-            MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => "ArduPilot".to_owned(),
-            MavAutopilot::MAV_AUTOPILOT_PX4 => "PX4".to_owned(),
-            other => words::lower_case(&other, "MAV_AUTOPILOT_"),
-        };
-        format!("{autopilot} {}", words::lower_case(&self.mavtype, "MAV_TYPE_"))
-    }
+/// Autopilot and type of another make, as in `ArduPilot quadrotor`.
+pub fn foreign_name(beat: &Sample<HEARTBEAT_DATA>) -> String {
+    let autopilot = match beat.value.autopilot {
+        MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA => "ArduPilot".to_owned(),
+        MavAutopilot::MAV_AUTOPILOT_PX4 => "PX4".to_owned(),
+        other => words::lower_case(&other, "MAV_AUTOPILOT_"),
+    };
+    format!("{autopilot} {}", words::lower_case(&beat.value.mavtype, "MAV_TYPE_"))
 }
 
 /// What `MAV_CMD_DO_FLIGHTTERMINATION` does to a vehicle of another make.
@@ -180,6 +156,8 @@ mod boot_tests {
 
 #[cfg(test)]
 mod foreign_tests {
+    use protocol::dialect::MavType;
+
     use super::*;
 
     fn beat(autopilot: MavAutopilot, mavtype: MavType, custom_mode: u32) -> HEARTBEAT_DATA {

@@ -8,7 +8,7 @@ use std::time::Duration;
 use protocol::book::{SignedHead, shown};
 use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
-use strum::IntoStaticStr;
+use strum::Display;
 
 use super::{LinkState, Model, Settings, Vehicle, is_on_pad};
 
@@ -141,20 +141,13 @@ const KEPT: usize = 500;
 const TEXT_LEN_MAX: usize = 400;
 
 /// Who reports an event.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, IntoStaticStr)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Display)]
 #[strum(serialize_all = "lowercase")]
 pub enum Speaker {
     /// The ground station.
     Ground,
     /// The vehicle, by its STATUSTEXT messages.
     Vehicle,
-}
-
-impl Speaker {
-    /// The name in lists and in the log.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]

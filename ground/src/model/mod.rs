@@ -252,18 +252,13 @@ impl Model {
     /// A model that knows nothing yet.
     ///
     /// A screen of a station in another process first receives the history, until
-    /// [`Self::history_ends`].
+    /// [`Alarms::history_ends`].
     pub fn new(settings: Settings) -> Self {
         let mut model = Self::default();
         model.alarms.in_history = matches!(settings.role, Role::Attached | Role::Watching);
         // The session decides where the numbers of the commands begin.
         model.commands.sender = CommandSender::new(settings.session);
         Self { settings, ..model }
-    }
-
-    /// The history has been received. Alarms that still hold ring from now on; ended ones do not.
-    pub fn history_ends(&mut self) {
-        self.alarms.history_ends();
     }
 
     /// Whether the vehicle is armed, in flight or being aborted, so that quitting must be
@@ -284,13 +279,12 @@ impl Model {
         self.pages.shown(self.vehicle.phase_now())
     }
 
-    /// The alarm that Space acknowledges: the chosen one on the list of alarms, otherwise the
-    /// foremost.
-    pub fn pointed_at(&self) -> Option<&Alarm> {
-        let listed = self.page() == Page::Alarms;
-        let chosen = self.pages.chosen.filter(|_| listed);
-        let chosen = chosen.and_then(|kind| self.alarms.list().iter().find(|alarm| alarm.what.kind == kind));
-        chosen.or_else(|| self.alarms.foremost())
+    /// The place in the list of the alarm that Space acknowledges: the one chosen on its page,
+    /// otherwise the foremost.
+    pub fn pointed_at(&self) -> Option<usize> {
+        let place = |kind| self.alarms.list().iter().position(|alarm| alarm.what.kind == kind);
+        let chosen = self.pages.chosen.filter(|_| self.page() == Page::Alarms);
+        chosen.and_then(place).or_else(|| place(self.alarms.foremost()?.what.kind))
     }
 
     /// Adds an event to the list, to the log and to the book.
@@ -435,7 +429,7 @@ impl Action {
     }
 
     pub(crate) fn event(speaker: Speaker, level: EventLevel, message: &str) -> Self {
-        let event = record::Event { level, name: speaker.name().to_owned(), message: message.to_owned() };
+        let event = record::Event { level, name: speaker.to_string(), message: message.to_owned() };
         Self::Record(Record::Event(event))
     }
 }

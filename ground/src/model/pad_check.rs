@@ -9,7 +9,7 @@ use protocol::dialect::{
 };
 use protocol::link_stats::FrameCounts;
 
-use super::{Acknowledgement, CommandKind, Model, Seat};
+use super::{Acknowledgement, CommandKind, Model, Seat, words};
 
 /// A check with motion takes 13 s, and 40 s if people watch the surfaces. If neither answer nor end
 /// of one that was asked for is heard, it may run for so long.
@@ -82,11 +82,9 @@ impl PadCheck {
     pub(crate) fn with(before: Option<Self>, told: &TD_PAD_CHECK_DATA, now: Duration) -> Self {
         let before = before.filter(|before| before.told.run == told.run);
         let runs = told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING;
-        let ended_at = match &before {
-            Some(before) if before.is_running() && !runs => Some(now),
-            Some(before) => before.ended_at,
-            None => None,
-        };
+        let ended_at = before
+            .as_ref()
+            .and_then(|before| if before.is_running() && !runs { Some(now) } else { before.ended_at });
         let mut values = before.map_or_else(BTreeMap::new, |before| before.values);
         if told.place < told.found {
             values.insert(told.place, told.clone());
@@ -142,8 +140,8 @@ impl PadCheck {
     }
 }
 
-/// Name, unit, factor from the wire's unit, and decimals, for the screen.
-pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, f64, usize) {
+/// Name and unit for the screen, and how to convert a number of the wire's unit to it.
+pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, impl Fn(f32) -> String) {
     use TdPadCheckItem as I;
     const DEG: f64 = 180.0 / std::f64::consts::PI;
     const MIB: f64 = 1.0 / (1024.0 * 1024.0);
@@ -168,9 +166,9 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, f64, usize) {
         I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => "battery".to_owned(),
         I::TD_PAD_CHECK_ITEM_GNSS_FIXES => "GNSS fixes".to_owned(),
         I::TD_PAD_CHECK_ITEM_GNSS_SPEED => "GNSS speed".to_owned(),
-        item => crate::model::words::lower_case(&item, "TD_PAD_CHECK_ITEM_"),
+        item => words::lower_case(&item, "TD_PAD_CHECK_ITEM_"),
     };
-    (name, unit, factor, decimals)
+    (name, unit, move |number: f32| words::fixed(factor * f64::from(number), decimals))
 }
 
 // The radio range test: how much is lost both ways, and how far the signal is above the noise.

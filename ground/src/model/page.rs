@@ -91,15 +91,12 @@ pub struct Pages {
 }
 
 /// A text that is being typed; the keys go to it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum TextEntry {
-    /// A note for the log and the book.
-    Note { typed: String },
-    Palette {
-        typed: String,
-        /// The place of the marked entry among those found.
-        chosen: usize,
-    },
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TextEntry {
+    pub typed: String,
+    /// In the palette the place of the marked entry among those found; `None` for a note, which
+    /// goes into log and book.
+    pub chosen: Option<usize>,
 }
 
 impl Pages {

@@ -96,17 +96,12 @@ impl Model {
             }
             (None, None) => return None,
         };
-        let predicted = predict_position(&self.vehicle, now).map(|at| Spot {
-            north_m: at.x_m,
-            east_m: at.y_m,
-            error_m: at.error_m,
-        });
         Some(LastPlace {
             boot: self.vehicle.boot.number().unwrap_or(0),
             heard_unix_s: self.settings.start_unix_s + at.as_secs(),
             heard,
             height_m,
-            predicted,
+            predicted: predict_position(&self.vehicle, now).map(|at| at.spot),
             pad: self.vehicle.pad,
         })
     }

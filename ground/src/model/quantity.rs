@@ -5,11 +5,12 @@ use std::time::Duration;
 use protocol::dialect::TD_CONTROLLER_DATA;
 use protocol::link_stats::LinkFigures;
 
-use super::{BodySpeed, Model, Motion, Sample, Vehicle};
+use super::{BodySpeed, Deflection, Gimbal, Model, Motion, Sample, Vehicle};
 
 type Read = fn(&Model, Duration) -> Option<Sample<f64>>;
 
 /// A number of the telemetry or of the link, in the unit of the screen.
+#[derive(Debug)]
 pub struct Quantity {
     /// Unique, in lower case.
     pub name: &'static str,
@@ -21,12 +22,6 @@ pub struct Quantity {
 impl PartialEq for Quantity {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
-    }
-}
-
-impl std::fmt::Debug for Quantity {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.write_str(self.name)
     }
 }
 
@@ -72,12 +67,8 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("tilt", "deg", 1, |m, _| m.vehicle.tilt_deg()),
     quantity("pitch", "deg", 1, |m, _| m.vehicle.of_attitude(|a| a.pitch_rad.to_degrees())),
     quantity("turn rate", "deg/s", 1, |m, _| m.vehicle.of_attitude(|a| a.turn_rate_rad_s().to_degrees())),
-    quantity("gimbal pitch", "deg", 2, |m, _| {
-        m.vehicle.gimbal().map(|gimbal| gimbal.map(|g| g.pitch.measured_rad.to_degrees()))
-    }),
-    quantity("gimbal yaw", "deg", 2, |m, _| {
-        m.vehicle.gimbal().map(|gimbal| gimbal.map(|g| g.yaw.measured_rad.to_degrees()))
-    }),
+    quantity("gimbal pitch", "deg", 2, |m, _| gimbal(&m.vehicle, |gimbal| gimbal.pitch)),
+    quantity("gimbal yaw", "deg", 2, |m, _| gimbal(&m.vehicle, |gimbal| gimbal.yaw)),
     quantity("fin 1", "deg", 1, |m, _| fin(&m.vehicle, 0)),
     quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
     quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
@@ -131,6 +122,10 @@ fn link(model: &Model, now: Duration, pick: fn(&LinkFigures) -> f64) -> Option<S
 
 fn body(model: &Model, pick: fn(&BodySpeed) -> f64) -> Option<Sample<f64>> {
     model.vehicle.body_speed().map(|body| body.map(pick))
+}
+
+fn gimbal(vehicle: &Vehicle, plane: fn(&Gimbal) -> Deflection) -> Option<Sample<f64>> {
+    vehicle.gimbal().map(|gimbal| gimbal.map(|gimbal| plane(gimbal).measured_rad.to_degrees()))
 }
 
 fn fin(vehicle: &Vehicle, number: usize) -> Option<Sample<f64>> {

@@ -11,16 +11,10 @@ use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Acknowledgement, CommandKind, Event, Model, Role, Sample, Seat, Speaker, TrackedCommand, Vehicle,
-    Verdict,
+    CommandKind, Event, Model, Role, Sample, Seat, Speaker, Vehicle, Verdict,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     is_on_pad, role_name,
 };
-
-/// The three words on approaching a vehicle that is down, or whose countdown was aborted.
-const KEEP_AWAY: &str = "DO NOT APPROACH";
-const ONE_PERSON: &str = "ONE PERSON: PIN IN";
-const MAY_APPROACH: &str = "MAY BE APPROACHED";
 
 /// Why nobody may approach, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,10 +74,19 @@ impl KeepAway {
         Some(Self { danger, wait_s })
     }
 
+    /// Whether one person may approach, to insert the pin.
+    pub fn is_for_the_pin(self) -> bool {
+        self.danger == Danger::LiveWaited
+    }
+
+    /// What to do.
+    fn headline(self) -> &'static str {
+        if self.is_for_the_pin() { "ONE PERSON: PIN IN" } else { "DO NOT APPROACH" }
+    }
+
     /// What to do, for how long, and the reason.
     pub fn sentence(&self) -> String {
-        let words = if self.danger == Danger::LiveWaited { ONE_PERSON } else { KEEP_AWAY };
-        format!("{words}{}", self.reason())
+        format!("{}{}", self.headline(), self.reason())
     }
 
     /// For how long, and the reason: what follows the words.
@@ -151,13 +154,8 @@ pub struct Unfinished {
 impl Model {
     /// What is unfinished now.
     pub fn unfinished(&self, now: Duration) -> Unfinished {
-        // A final refusal is an answer, too.
-        let confirmed = |track: &TrackedCommand| {
-            let answered = matches!(track.acknowledged, Acknowledgement::Answered(_));
-            answered && (track.observed_at.is_some() || !track.accepted())
-        };
         let abort = match self.commands.of(CommandKind::Abort) {
-            Some(track) if confirmed(track) => None,
+            Some(track) if track.is_confirmed() => None,
             Some(track) => {
                 Some(asked_words(self.settings.start_unix_s + track.commanded_at.as_secs(), &track.by))
             }
@@ -174,11 +172,10 @@ impl Model {
             self.say(now, Speaker::Ground, EventLevel::Error, text);
         }
         self.abort_before = kept.abort;
-        let full = |danger| match danger {
-            Danger::LiveWaited => KeepAway { danger: Danger::Live, wait_s: Some(UNTOLD_WAIT_S) },
-            danger => KeepAway { danger, wait_s: Some(UNTOLD_WAIT_S) },
-        };
-        self.vehicle.before = kept.danger.map(|danger| Sample::new(full(danger), now));
+        self.vehicle.before = kept.danger.map(|danger| {
+            let danger = if danger == Danger::LiveWaited { Danger::Live } else { danger };
+            Sample::new(KeepAway { danger, wait_s: Some(UNTOLD_WAIT_S) }, now)
+        });
     }
 }
 
@@ -191,9 +188,8 @@ pub fn asked_words(unix_s: u64, by: &Seat) -> String {
 /// Whether people may approach a vehicle that is down, or whose countdown was aborted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
-    DoNot(KeepAway),
-    /// The waiting time is over, and the motor is live: one person may, to put the pin in.
-    OneForThePin(KeepAway),
+    /// They may not, but perhaps one person to insert the pin.
+    Away(KeepAway),
     /// They may, for this reason.
     May(&'static str),
 }
@@ -203,13 +199,13 @@ impl Approach {
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let before = vehicle.away_before(now);
         let Some(status) = vehicle.status.as_ref().map(|status| &status.value) else {
-            return before.map(Self::of_away);
+            return before.map(Self::Away);
         };
         if vehicle.in_flight() || !(concerns(status) || before.is_some()) {
             return None;
         }
         Some(match (KeepAway::of(vehicle, now), status.motor) {
-            (Some(away), _) => Self::of_away(away),
+            (Some(away), _) => Self::Away(away),
             (None, TdMotor::TD_MOTOR_PIN_IN) => Self::May("the pin is in"),
             (None, TdMotor::TD_MOTOR_BURNT) => Self::May("the motor is burnt out and cool"),
             (None, TdMotor::TD_MOTOR_HOT) => {
@@ -219,23 +215,18 @@ impl Approach {
         })
     }
 
-    fn of_away(away: KeepAway) -> Self {
-        if away.danger == Danger::LiveWaited { Self::OneForThePin(away) } else { Self::DoNot(away) }
-    }
-
     /// The words that stand largest on every page.
     pub fn headline(&self) -> &'static str {
         match self {
-            Self::DoNot(_) => KEEP_AWAY,
-            Self::OneForThePin(_) => ONE_PERSON,
-            Self::May(_) => MAY_APPROACH,
+            Self::Away(away) => away.headline(),
+            Self::May(_) => "MAY BE APPROACHED",
         }
     }
 
     /// What follows the headline in a sentence: for how long, and the reason.
     pub fn reason(&self) -> String {
         match self {
-            Self::DoNot(away) | Self::OneForThePin(away) => away.reason(),
+            Self::Away(away) => away.reason(),
             Self::May(why) => format!(": {why}"),
         }
     }
@@ -285,11 +276,7 @@ impl Model {
     /// The time before the release, as it is shown here, from which on a hold comes too late, s:
     /// what is shown is old by the way down, and a hold takes the way up. `None` if the vehicle
     /// does not tell it.
-    pub fn last_hold_s(&self) -> Option<f64> {
-        self.last_hold_of(&self.vehicle)
-    }
-
-    fn last_hold_of(&self, vehicle: &Vehicle) -> Option<f64> {
+    pub fn last_hold_s(&self, vehicle: &Vehicle) -> Option<f64> {
         let round_trip = self.link.round_trip.unwrap_or_default();
         vehicle.last_hold_s().map(|last_s| last_s + round_trip.as_secs_f64())
     }
@@ -298,7 +285,7 @@ impl Model {
     pub fn is_past_hold(&self, now: Duration) -> bool {
         let past = |vehicle: &Vehicle| {
             let left_s = vehicle.countdown_s().map(|left| left.value - left.age(now).as_secs_f64());
-            left_s.zip(self.last_hold_of(vehicle)).is_some_and(|(left_s, last_s)| left_s <= last_s)
+            left_s.zip(self.last_hold_s(vehicle)).is_some_and(|(left_s, last_s)| left_s <= last_s)
         };
         let mut counted = self.every_vehicle(now).filter(|vehicle| vehicle.counts_down()).peekable();
         counted.peek().is_some() && counted.all(past)

@@ -13,8 +13,8 @@ use protocol::motion::Degrees;
 pub use protocol::reported::{phase_from_number, phase_of};
 
 use super::{
-    Attitude, Battery, Deflection, FlownMission, Foreign, Gimbal, Heartbeat, Motion, PadCheck, Prediction,
-    Sample, Touchdown, Vehicle, Verdict, is_on_pad, may_be_ours,
+    Attitude, Battery, Deflection, FlownMission, Gimbal, Heartbeat, Motion, PadCheck, Prediction, Sample,
+    Touchdown, Vehicle, Verdict, extend_path, is_on_pad, may_be_ours,
 };
 
 /// Takes a message of the vehicle into its model.
@@ -44,7 +44,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             let phase = vehicle.phase_now();
             vehicle.trend.note(data.time_boot_ms, &motion, phase);
             if vehicle.in_flight() {
-                vehicle.flown.extend(&motion);
+                extend_path(&mut vehicle.flown, &motion);
             }
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {
@@ -134,12 +134,8 @@ impl Vehicle {
         self.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING)
     }
 
-    /// Whether it reports no satellite fix.
-    pub fn gnss_is_lost(&self) -> bool {
-        self.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS)
-    }
-
-    fn is_unhealthy(&self, part: MavSysStatusSensor) -> bool {
+    /// Whether it reports that this part does not work; a receiver without a fix does not.
+    pub fn is_unhealthy(&self, part: MavSysStatusSensor) -> bool {
         self.last::<SYS_STATUS_DATA>().is_some_and(|Sample { value, .. }| {
             value.onboard_control_sensors_present.contains(part)
                 && !value.onboard_control_sensors_health.contains(part)
@@ -183,7 +179,7 @@ fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> b
                 *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() };
                 vehicle.heartbeat = Some(Sample::new(heartbeat(beat), now));
             }
-            vehicle.foreign = Some(Foreign::of(beat, now));
+            vehicle.foreign = Some(Sample::new(beat.clone(), now));
             true
         }
         MavMessage::HEARTBEAT(_) | MavMessage::TD_FLIGHT_STATUS(_) => false,

@@ -5,16 +5,16 @@ use std::time::Duration;
 
 use mavlink::{MavlinkVersion, Message as _, MessageData};
 use protocol::dialect::{
-    MavMessage, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA, TD_TOUCHDOWN_LIMITS_DATA, TdChute,
-    TdInterlock, TdLanding, TdPhase, TdRole,
+    HEARTBEAT_DATA, MavMessage, TD_DESCENT_DATA, TD_FINDING_DATA, TD_FLIGHT_STATUS_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TdChute, TdInterlock, TdLanding, TdPhase, TdRole,
 };
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
 use protocol::reported::ReportedState;
 
 use super::{
-    Attitude, BodySpeed, Boot, Deflection, FlownPath, Foreign, KeepAway, Motion, PadCheck, ToldChecks,
-    Touchdown, Trend,
+    Attitude, BodySpeed, Boot, Deflection, KeepAway, Motion, NorthEastUp, PadCheck, ToldChecks, Touchdown,
+    Trend,
 };
 
 /// A value older than this is marked as stale.
@@ -138,8 +138,8 @@ pub struct Vehicle {
     pub findings: Findings,
     /// The recent change of its velocity.
     pub trend: Trend,
-    /// The path it flew.
-    pub flown: FlownPath,
+    /// The path it flew: positions north, east and up from the pad, m, oldest first.
+    pub flown: Vec<NorthEastUp>,
     /// Its flight computer was reset in this flight.
     pub reset_in_flight: bool,
     pub left_pad_at: Option<Duration>,
@@ -150,8 +150,8 @@ pub struct Vehicle {
     /// What was said of approaching before a power cycle, and when: a waiting time goes on through
     /// a boot.
     pub(crate) before: Option<Sample<KeepAway>>,
-    /// The vehicle with another autopilot that was heard under this id.
-    pub foreign: Option<Foreign>,
+    /// The heartbeat of a vehicle with another autopilot under this id.
+    pub foreign: Option<Sample<HEARTBEAT_DATA>>,
 }
 
 /// What the vehicle says went wrong in its flight, as far as it has arrived.
@@ -232,17 +232,17 @@ impl Vehicle {
     }
 
     /// The vehicle, if it is none of ours: it has another autopilot, and has sent no flight status.
-    pub fn as_foreign(&self) -> Option<&Foreign> {
+    pub fn as_foreign(&self) -> Option<&Sample<HEARTBEAT_DATA>> {
         self.foreign.as_ref().filter(|_| self.status.is_none())
-    }
-
-    /// Whether it has always reported to be simulated. Unknown counts as real.
-    pub fn is_simulated(&self) -> bool {
-        self.boot.is_simulated()
     }
 
     pub fn interlocks(&self) -> Option<TdInterlock> {
         self.status.as_ref().map(|status| status.value.interlocks)
+    }
+
+    /// Whether it reports this interlock.
+    pub fn shows(&self, interlock: TdInterlock) -> bool {
+        self.interlocks().is_some_and(|locks| locks.contains(interlock))
     }
 
     /// Whether the landing motor can still be lit: no latch forbids it. Unknown counts as no.

@@ -13,7 +13,7 @@ use protocol::dialect::TdPhase;
 use crate::key::Key;
 use crate::model::{Model, Playback, Settings};
 use crate::update::{Action, Msg, update};
-use recording::{Reader, RecordedEvent, Recording};
+use recording::{Reader, Recording};
 
 // Plays a recording: pause, speed, seek. It reads no clock; the caller passes the elapsed time.
 
@@ -21,8 +21,9 @@ use recording::{Reader, RecordedEvent, Recording};
 const TICK: Duration = Duration::from_millis(100);
 /// How far Left and Right seek.
 const SEEK: Duration = Duration::from_secs(5);
-/// The range of speeds, as powers of two.
-const SPEED_EXPONENTS: std::ops::RangeInclusive<i32> = -3..=6;
+/// The range of speeds, recorded time per real time.
+const SPEED_MIN: f64 = 0.125;
+const SPEED_MAX: f64 = 64.0;
 
 /// A recording and the present position in it.
 pub struct Player {
@@ -30,29 +31,26 @@ pub struct Player {
     settings: Settings,
     /// The model at the present position.
     pub model: Model,
-    position: Duration,
+    playing: Playback,
     next_tick: Duration,
     /// The rest of the recording; `None` after a read error.
     reader: Option<Reader>,
-    next_event: Option<(Duration, RecordedEvent)>,
-    paused: bool,
-    speed_exponent: i32,
+    next_event: Option<(Duration, Msg)>,
 }
 
 impl Player {
     /// Starts at the beginning, running.
     pub fn new(recording: Recording, settings: Settings) -> Self {
         let settings = Settings { vehicle: recording.vehicle.unwrap_or(settings.vehicle), ..settings };
+        let (length, phases) = (recording.length, Arc::clone(&recording.phases));
         let mut player = Self {
             model: Model::new(settings.clone()),
+            playing: Playback { position: Duration::ZERO, length, speed: 1.0, paused: false, phases },
             recording,
             settings,
-            position: Duration::ZERO,
             next_tick: Duration::ZERO,
             reader: None,
             next_event: None,
-            paused: false,
-            speed_exponent: 0,
         };
         player.rewind();
         player.advance_to(Duration::ZERO);
@@ -61,7 +59,7 @@ impl Player {
 
     /// The present position.
     pub fn position(&self) -> Duration {
-        self.position
+        self.playing.position
     }
 
     pub fn recording(&self) -> &Recording {
@@ -70,8 +68,8 @@ impl Player {
 
     /// Lets this much real time pass.
     pub fn pass(&mut self, elapsed: Duration) {
-        if !self.paused {
-            let target = self.position + elapsed.mul_f64(libm::exp2(f64::from(self.speed_exponent)));
+        if !self.playing.paused {
+            let target = self.playing.position + elapsed.mul_f64(self.playing.speed);
             self.advance_to(target.min(self.recording.length));
         }
     }
@@ -79,11 +77,11 @@ impl Player {
     /// Goes to a time. To go back, the recording is played again from its start.
     pub fn seek(&mut self, to: Duration) {
         let to = to.min(self.recording.length);
-        if to < self.position {
+        if to < self.playing.position {
             let pages = std::mem::take(&mut self.model.pages);
             self.model = Model::new(self.settings.clone());
             self.model.pages = pages;
-            (self.position, self.next_tick) = (Duration::ZERO, Duration::ZERO);
+            (self.playing.position, self.next_tick) = (Duration::ZERO, Duration::ZERO);
             self.rewind();
         }
         self.advance_to(to);
@@ -91,7 +89,8 @@ impl Player {
 
     /// Goes to the start of a phase. Returns whether the recording has it.
     pub fn seek_phase(&mut self, phase: TdPhase) -> bool {
-        let begin = self.recording.begin_of(phase);
+        let phases = &self.recording.phases;
+        let begin = phases.iter().find(|(known, _)| *known == phase).map(|(_, at)| *at);
         if let Some(at) = begin {
             self.seek(at);
         }
@@ -104,39 +103,38 @@ impl Player {
         match key {
             // A text that is being typed takes every key.
             _ if self.model.pages.entry.is_some() => {
-                actions = update(&mut self.model, Msg::Keys(vec![key]), self.position);
+                actions = update(&mut self.model, Msg::Keys(vec![key]), self.playing.position);
             }
-            Key::Char(' ') => self.paused = !self.paused,
-            Key::Char('+' | '=') => self.faster(1),
-            Key::Char('-') => self.faster(-1),
-            Key::Left => self.seek(self.position.saturating_sub(SEEK)),
-            Key::Right => self.seek(self.position + SEEK),
+            Key::Char(' ') => self.playing.paused = !self.playing.paused,
+            Key::Char('+' | '=') => self.faster(2.0),
+            Key::Char('-') => self.faster(0.5),
+            Key::Left => self.seek(self.playing.position.saturating_sub(SEEK)),
+            Key::Right => self.seek(self.playing.position + SEEK),
             // The start of the present phase, or of the previous one if it has just begun.
             Key::Char('[') => {
-                let limit = self.position.saturating_sub(Duration::from_secs(1));
+                let limit = self.playing.position.saturating_sub(Duration::from_secs(1));
                 let begins = self.recording.phases.iter().rfind(|(_, at)| *at <= limit);
                 self.seek(begins.map_or(Duration::ZERO, |(_, at)| *at));
             }
             Key::Char(']') => {
-                let begins = self.recording.phases.iter().find(|(_, at)| *at > self.position);
+                let begins = self.recording.phases.iter().find(|(_, at)| *at > self.playing.position);
                 self.seek(begins.map_or(Duration::MAX, |(_, at)| *at));
             }
             Key::Char('g') => self.seek(Duration::ZERO),
             Key::Char('G') => self.seek(self.recording.length),
             // Pages and scrolling. Keys that command a vehicle have no effect in a replay.
-            _ => actions = update(&mut self.model, Msg::Keys(vec![key]), self.position),
+            _ => actions = update(&mut self.model, Msg::Keys(vec![key]), self.playing.position),
         }
         // A key to quit waits for a paste to show itself; a replay has nothing to protect.
         if self.model.quit_at.take().is_some() {
             actions.push(Action::Quit);
         }
-        self.update_playing();
+        self.model.playing = Some(self.playing.clone());
         actions
     }
 
-    fn faster(&mut self, doublings: i32) {
-        let (least, most) = (*SPEED_EXPONENTS.start(), *SPEED_EXPONENTS.end());
-        self.speed_exponent = (self.speed_exponent + doublings).clamp(least, most);
+    fn faster(&mut self, factor: f64) {
+        self.playing.speed = (self.playing.speed * factor).clamp(SPEED_MIN, SPEED_MAX);
     }
 
     fn rewind(&mut self) {
@@ -147,19 +145,14 @@ impl Player {
         self.next_event = self.read_event();
     }
 
-    fn read_event(&mut self) -> Option<(Duration, RecordedEvent)> {
-        match self.reader.as_mut()?.next_event() {
-            Ok(event) => event,
-            Err(error) => {
-                self.stop_reading(&error);
-                None
-            }
-        }
+    fn read_event(&mut self) -> Option<(Duration, Msg)> {
+        let event = self.reader.as_mut()?.next()?;
+        event.inspect_err(|error| self.stop_reading(error)).ok()
     }
 
     fn stop_reading(&mut self, error: &std::io::Error) {
         self.reader = None;
-        self.model.warn(self.position, format!("the log can no longer be read: {error}"));
+        self.model.warn(self.playing.position, format!("the log can no longer be read: {error}"));
     }
 
     fn advance_to(&mut self, to: Duration) {
@@ -181,32 +174,21 @@ impl Player {
                 }
             }
         }
-        self.position = to;
-        self.update_playing();
+        self.playing.position = to;
+        self.model.playing = Some(self.playing.clone());
     }
 
-    fn show(&mut self, event: RecordedEvent, at: Duration) {
-        let msgs = match event {
-            RecordedEvent::Heard(frame) => {
+    fn show(&mut self, event: Msg, at: Duration) {
+        let received = match &event {
+            Msg::Frame(frame) => {
                 let (bytes, framing) = (frame.as_bytes().len(), self.model.link.framing);
-                vec![Msg::Frame(frame), Msg::Received { bytes, framing }]
+                Some(Msg::Received { bytes, framing })
             }
-            RecordedEvent::Commanded(kind) => vec![Msg::Commanded(kind)],
-            RecordedEvent::Sent(bytes) => vec![Msg::Sent { bytes, drops: 0 }],
+            _ => None,
         };
-        for msg in msgs {
+        for msg in [event].into_iter().chain(received) {
             // The actions are dropped: what the ground did is part of the recording.
             drop(update(&mut self.model, msg, at));
         }
-    }
-
-    fn update_playing(&mut self) {
-        self.model.playing = Some(Playback {
-            position: self.position,
-            length: self.recording.length,
-            speed: libm::exp2(f64::from(self.speed_exponent)),
-            paused: self.paused,
-            phases: Arc::clone(&self.recording.phases),
-        });
     }
 }

@@ -5,10 +5,11 @@ use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
 use std::io::{BufReader, Read as _, Seek as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use protocol::dialect::{MavMessage, TdPhase};
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -17,6 +18,7 @@ use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
+use crate::update::Msg;
 
 /// A larger step back in time means that the clock was set back, not that frames of two links are
 /// out of order. An MCAP log has none.
@@ -25,20 +27,6 @@ const CLOCK_SET_BACK_NS: i128 = 1_000_000_000;
 const LEFT_OUT_NS: i128 = 3_600 * 1_000_000_000;
 /// The most phase changes that are kept; a flight has about ten.
 const PHASES_MAX: usize = 10_000;
-
-/// Why a log cannot be played.
-#[derive(Debug, thiserror::Error)]
-pub enum RecordingError {
-    /// The file cannot be read.
-    #[error("cannot read {}", path.display())]
-    Read { path: PathBuf, source: io::Error },
-    /// There is nothing to show.
-    #[error("{}: contains no frames of a vehicle; is it a log of `ground` or `onboard-sim`?", path.display())]
-    Empty { path: PathBuf },
-    /// Nothing says when its frames came.
-    #[error("{}: is a MAVLink stream without times; a .tlog has one before each frame", path.display())]
-    NoTimes { path: PathBuf },
-}
 
 /// A recorded flight.
 #[derive(Debug)]
@@ -64,36 +52,35 @@ impl Recording {
     ///
     /// # Errors
     /// The file cannot be read, or holds nothing to show.
-    pub fn load(path: &Path, vehicle: Option<Address>) -> Result<Self, RecordingError> {
-        let read = |source| RecordingError::Read { path: path.to_owned(), source };
-        let file = File::open(path).map_err(read)?;
-        let mut events = LogEvents::begin(&file, vehicle).map_err(read)?;
+    pub fn load(path: &Path, vehicle: Option<Address>) -> anyhow::Result<Self> {
+        let shown = path.display();
+        let reading = || format!("cannot read {shown}");
+        let file = File::open(path).with_context(reading)?;
+        let mut events = LogEvents::begin(&file, vehicle).with_context(reading)?;
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
-        while let Some((side, at, event)) = events.next_event().map_err(read)? {
+        while let Some((side, at, event)) = events.next_event().with_context(reading)? {
             let survey = if side == Side::Ground { &mut ground } else { &mut vehicle };
             survey.note(at, &event);
         }
         // What the ground received; if that is missing, what the vehicle sent.
         let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
         let Some((side, survey)) = found.into_iter().find(|(_, survey)| survey.has_vehicle) else {
-            let (path, mut start, mut framer) = (path.to_owned(), Vec::new(), Framer::new());
-            (&file).rewind().map_err(read)?;
-            (&file).take(BUFFER_BYTES as u64).read_to_end(&mut start).map_err(read)?;
+            let (mut start, mut framer) = (Vec::new(), Framer::new());
+            (&file).rewind().with_context(reading)?;
+            (&file).take(BUFFER_BYTES as u64).read_to_end(&mut start).with_context(reading)?;
             framer.push(&start);
             let is_log = matches!(events.format, Format::Tlog(_)) || start.starts_with(b"\x89MCAP");
             let is_stream = !is_log && framer.next_frame().is_some();
-            let error =
-                if is_stream { RecordingError::NoTimes { path } } else { RecordingError::Empty { path } };
-            return Err(error);
+            let why = if is_stream {
+                "is a MAVLink stream without times; a .tlog has one before each frame"
+            } else {
+                "contains no frames of a vehicle; is it a log of `ground` or `onboard-sim`?"
+            };
+            anyhow::bail!("{shown}: {why}");
         };
         let Survey { events: count, length, phases, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
         Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
-    }
-
-    /// When a phase first began.
-    pub fn begin_of(&self, phase: TdPhase) -> Option<Duration> {
-        self.phases.iter().find(|(known, _)| *known == phase).map(|(_, at)| *at)
     }
 
     /// A reader at the first event.
@@ -101,8 +88,14 @@ impl Recording {
     /// # Errors
     /// The file can no longer be read.
     pub fn reader(&self) -> io::Result<Reader> {
-        let events = LogEvents::begin(&self.file, self.vehicle)?;
-        Ok(Reader { events, side: self.side, left: self.events })
+        let mut events = LogEvents::begin(&self.file, self.vehicle)?;
+        let (recorded_by, left) = (self.side, usize::try_from(self.events).unwrap_or(usize::MAX));
+        let all = std::iter::from_fn(move || events.next_event().transpose());
+        let ours = all.filter_map(move |event| match event {
+            Ok((side, at, event)) => (side == recorded_by).then_some(Ok((at, event))),
+            Err(error) => Some(Err(error)),
+        });
+        Ok(Box::new(ours.take(left)))
     }
 }
 
@@ -116,10 +109,10 @@ struct Survey {
 }
 
 impl Survey {
-    fn note(&mut self, at: Duration, event: &RecordedEvent) {
+    fn note(&mut self, at: Duration, event: &Msg) {
         self.length = at;
         self.events += 1;
-        if let RecordedEvent::Heard(frame) = event {
+        if let Msg::Frame(frame) = event {
             self.has_vehicle = true;
             if let Some(phase) = phase_of(frame)
                 && self.phases.last().is_none_or(|(last, _)| *last != phase)
@@ -131,29 +124,8 @@ impl Survey {
     }
 }
 
-/// Reads the events of a recording in order.
-pub struct Reader {
-    events: LogEvents,
-    side: Side,
-    left: u64,
-}
-
-impl Reader {
-    /// The next event and its time.
-    ///
-    /// # Errors
-    /// The file can no longer be read.
-    pub fn next_event(&mut self) -> io::Result<Option<(Duration, RecordedEvent)>> {
-        while self.left > 0 {
-            let Some((side, at, event)) = self.events.next_event()? else { break };
-            if side == self.side {
-                self.left -= 1;
-                return Ok(Some((at, event)));
-            }
-        }
-        Ok(None)
-    }
-}
+/// The events of a recording with their times, in order, until the file can no longer be read.
+pub type Reader = Box<dyn Iterator<Item = io::Result<(Duration, Msg)>> + Send>;
 
 /// Converts the time stamps of a file to times from zero that never decrease, and skips long gaps.
 #[derive(Debug, Clone, Copy, Default)]
@@ -189,16 +161,6 @@ fn phase_of(frame: &Frame) -> Option<TdPhase> {
 
 /// The size of the read buffer: some thousand frames.
 const BUFFER_BYTES: usize = 256 * 1024;
-/// An event of a recording.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RecordedEvent {
-    /// A frame arrived from the vehicle.
-    Heard(Frame),
-    /// The crew gave a command.
-    Commanded(CommandKind),
-    /// The ground sent something else, of this many bytes.
-    Sent(usize),
-}
 
 /// Who recorded a frame; the log of a demonstration contains both sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -218,7 +180,7 @@ struct LogEvents {
     /// The latest time stamp of an MCAP log.
     latest_ns: u64,
     /// What the last record holds.
-    waiting: VecDeque<(Side, Duration, RecordedEvent)>,
+    waiting: VecDeque<(Side, Duration, Msg)>,
 }
 
 enum Format {
@@ -254,7 +216,7 @@ impl LogEvents {
         }
     }
 
-    fn next_event(&mut self) -> io::Result<Option<(Side, Duration, RecordedEvent)>> {
+    fn next_event(&mut self) -> io::Result<Option<(Side, Duration, Msg)>> {
         loop {
             if let Some(event) = self.waiting.pop_front() {
                 return Ok(Some(event));
@@ -296,7 +258,7 @@ impl LogEvents {
 
     /// The event of a frame: a frame of the vehicle, the first sending of a command, or another
     /// frame of the ground.
-    fn event_of(&mut self, frame: Frame) -> Option<RecordedEvent> {
+    fn event_of(&mut self, frame: Frame) -> Option<Msg> {
         let source = frame.source();
         if source.component_id == VEHICLE.component_id {
             self.vehicle.get_or_insert(source);
@@ -304,11 +266,11 @@ impl LogEvents {
             self.ground.get_or_insert(source);
         }
         if Some(source) == self.vehicle {
-            return Some(RecordedEvent::Heard(frame));
+            return Some(Msg::Frame(frame));
         }
         (Some(source) == self.ground).then(|| {
-            let kind = command_in(&frame);
-            kind.map_or(RecordedEvent::Sent(frame.as_bytes().len()), RecordedEvent::Commanded)
+            let sent = Msg::Sent { bytes: frame.as_bytes().len(), drops: 0 };
+            command_in(&frame).map_or(sent, Msg::Commanded)
         })
     }
 }
@@ -317,7 +279,7 @@ impl LogEvents {
 fn command_in(frame: &Frame) -> Option<CommandKind> {
     let Ok(MavMessage::COMMAND_LONG(sent)) = frame.decode() else { return None };
     let is_sent = |kind: &CommandKind| {
-        let (command, param1) = kind.mav_command();
+        let (command, param1) = kind.row().mav;
         let fits = command == sent.command && (param1 - sent.param1).abs() < 0.5;
         // With the number of an ask it confirms that ask.
         let confirms = sent.param3 >= 1.0;

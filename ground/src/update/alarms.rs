@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use protocol::dialect::{
-    ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, TD_CONTROLLER_DATA, TdCheck, TdControlLevel, TdInterlock,
-    TdPhase,
+    ESTIMATOR_STATUS_DATA, EstimatorStatusFlags, MavSysStatusSensor, TD_CONTROLLER_DATA, TdCheck,
+    TdControlLevel, TdInterlock, TdPhase,
 };
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
@@ -13,7 +13,7 @@ use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
     LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, Speaker, dead_reckoning::may_have_left,
-    hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
+    foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -76,8 +76,8 @@ const OF_STATION: [AlarmRow; 15] = [
     }),
     of_run(AlarmKind::Foreign, WHO, |model, now| {
         let version = "ANOTHER VERSION: the vehicle is heard, but its messages do not fit this station's; take one version on both";
-        let foreign =
-            model.vehicle.as_foreign().map(|foreign| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name()));
+        let named = |beat| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign_name(beat));
+        let foreign = model.vehicle.as_foreign().map(named);
         let foreign = foreign.or_else(|| model.speaks_another_version(now).then(|| version.to_owned()));
         foreign.filter(|_| model.beside(now).is_none())
     }),
@@ -147,7 +147,7 @@ const OF_VEHICLE: [AlarmRow; 14] = [
     }),
     of_boot(AlarmKind::Aborted, VEHICLE, |model, _| latch_words(model)),
     of_boot(AlarmKind::NoLight, VEHICLE, |model, _| {
-        let no_light = model.vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT);
+        let no_light = model.vehicle.shows(TdInterlock::TD_INTERLOCK_NO_LIGHT);
         no_light.then(|| "NO LIGHT: the motor did not light".to_owned())
     }),
     of_boot(AlarmKind::NotLanded, OTHER, |model, now| {
@@ -221,7 +221,7 @@ fn is_unheard(model: &Model, now: Duration) -> bool {
 
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<Condition>) {
     for track in &model.commands.tracks {
-        let name = track.kind.name();
+        let name = track.kind.row().name;
         let persists = track.kind.row().resend.is_persistent();
         let urgency = match track.kind {
             CommandKind::Abort => ABORT,
@@ -277,7 +277,7 @@ fn position(model: &Model) -> Option<String> {
     let is_unknown = |Sample { value, .. }: Sample<ESTIMATOR_STATUS_DATA>| {
         !value.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS)
     };
-    let lost = if model.vehicle.gnss_is_lost() {
+    let lost = if model.vehicle.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS) {
         "GNSS"
     } else {
         model.vehicle.last().is_some_and(is_unknown).then_some("POSITION")?

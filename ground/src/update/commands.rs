@@ -10,9 +10,9 @@ use protocol::mission::MissionHash;
 
 use super::Action;
 use crate::model::{
-    Acknowledgement, AutoStep, CommandKind, Commands, LogFault, LogStanding, Model, Seat, Speaker,
-    TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen, why_not_start,
-    why_not_take, why_nothing_moves, why_untested,
+    Acknowledgement, AutoStep, CommandKind, CommandRow, Commands, LogFault, LogStanding, Model, Seat,
+    Speaker, TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen,
+    why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
@@ -83,7 +83,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         }
         None => submit(model, kind, by.clone(), now),
         Some(why) => {
-            let text = format!("cannot {}: {why}{}", kind.name().to_lowercase(), by.in_brackets());
+            let text = format!("cannot {}: {why}{}", kind.row().name.to_lowercase(), by.in_brackets());
             model.tell_act(now, "not sent", by, EventLevel::Warning, text);
         }
     }
@@ -92,7 +92,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
 /// Why not to send a command that another screen has just sent.
 fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<String> {
     let track = model.commands.of(kind).filter(|track| track.is_on_its_way(now))?;
-    Some(format!("{} is already on its way{}", kind.name(), track.by.in_brackets()))
+    Some(format!("{} is already on its way{}", kind.row().name, track.by.in_brackets()))
 }
 
 /// Sends a command to the vehicle and starts to follow it.
@@ -141,7 +141,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
 }
 
 fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
-    let (command, param1) = kind.mav_command();
+    let CommandRow { mav: (command, param1), moves, resend, .. } = kind.row();
     // A confirmation names the ask that it confirms; without a number it would be another ask.
     let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
     let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
@@ -149,9 +149,9 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
     let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 3], MissionHash::to_params);
     let [param4, param5, param6] = mission;
-    let boot = if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 };
+    let boot = if moves { model.vehicle.boot.parameter() } else { 0.0 };
     let params = [param1, 0.0, number, param4, param5, param6, boot];
-    model.commands.sender.submit(model.settings.vehicle, command, params, kind.row().resend, now)
+    model.commands.sender.submit(model.settings.vehicle, command, params, resend, now)
 }
 
 /// Sends the commands that are due and handles what happened to them.
@@ -178,7 +178,7 @@ pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration)
 
 /// The latest command with this MAVLink number; arming and disarming share one.
 fn track_of(model: &mut Model, command: u16) -> Option<&mut TrackedCommand> {
-    model.commands.tracks.iter_mut().rfind(|track| track.kind.mav_command().0 as u16 == command)
+    model.commands.tracks.iter_mut().rfind(|track| track.kind.row().mav.0 as u16 == command)
 }
 
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
@@ -195,7 +195,7 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     };
     let Some(track) = track else { return };
     let kind = track.kind;
-    let name = kind.name();
+    let name = kind.row().name;
     let (by, seat) = (track.by.in_brackets(), track.by.clone());
     let mut answered = None;
     let (operator_kind, level, text) = match event {
@@ -245,15 +245,21 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     }
 }
 
+/// After a temporary refusal, what the vehicle reports about its checks is accepted only after
+/// this.
+const RETRY_AFTER: Duration = Duration::from_secs(1);
+
 fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Duration) {
     let refused = result != MavResult::MAV_RESULT_ACCEPTED as u8;
     let for_now = result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
     match kind {
-        CommandKind::Arm if for_now && model.settings.auto && model.auto_step.retry_after_refusal(now) => {
+        CommandKind::Arm if for_now && model.settings.auto && model.auto_step == AutoStep::WaitForArmed => {
+            // As a new command, and never by resending the old frame.
+            model.auto_step = AutoStep::WaitForReady { not_before: now + RETRY_AFTER };
             model.info(now, "automatic mode: temporarily refused; arms again when the checks pass");
         }
         CommandKind::Arm | CommandKind::Start if refused => {
-            model.outcome.refusal = Some((format!("{} {}", kind.name(), result_words(result)), now));
+            model.outcome.refusal = Some((format!("{} {}", kind.row().name, result_words(result)), now));
         }
         // A temporary refusal does not end an abort.
         CommandKind::Abort if for_now => {
@@ -262,30 +268,18 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
                 track.acknowledged_at = None;
             }
         }
-        // The refusal is permanent, so further attempts change nothing.
-        CommandKind::Abort if refused => stop_aborting(model, now),
-        CommandKind::Abort => stop_if_latched(model, now),
+        CommandKind::Abort => stop_if_confirmed(model, now),
         _ => {}
     }
 }
 
-/// An abort is resent until it has been answered and the vehicle's own state shows the latch.
-fn stop_if_latched(model: &mut Model, now: Duration) {
-    let done = model.commands.of(CommandKind::Abort).is_some_and(|track| {
-        let answered = matches!(track.acknowledged, Acknowledgement::Answered(_));
-        answered && track.observed_at.is_some()
-    });
-    if done {
-        stop_aborting(model, now);
-    }
-}
-
-fn stop_aborting(model: &mut Model, now: Duration) {
-    // Of two vehicles under one id nobody knows which one has answered.
-    if model.beside(now).is_some() {
-        return;
-    }
-    if let Some(ticket) = model.commands.of(CommandKind::Abort).map(|track| track.ticket) {
+/// An abort is resent until it has been accepted and the vehicle's own state shows the latch, or
+/// until it has been refused permanently.
+fn stop_if_confirmed(model: &mut Model, now: Duration) {
+    let confirmed = model.commands.of(CommandKind::Abort).filter(|track| track.is_confirmed());
+    // Of two vehicles under one id it is not known which one has answered.
+    let confirmed = confirmed.filter(|_| model.beside(now).is_none());
+    if let Some(ticket) = confirmed.map(|track| track.ticket) {
         model.commands.sender.withdraw_one(ticket, now);
     }
 }
@@ -296,7 +290,7 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
     let aborting = model.commands.is_aborting();
     let by = model.commands.of(CommandKind::Abort).map(|track| track.by.clone()).unwrap_or_default();
     model.commands.sender.withdraw_all(now);
-    let void = model.commands.tracks.iter().map(|track| track.kind.name()).collect();
+    let void = model.commands.tracks.iter().map(|track| track.kind.row().name).collect();
     model.commands.tracks.clear();
     if aborting {
         submit(model, CommandKind::Abort, by, now);
@@ -310,11 +304,10 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
     let flies = model.vehicle.in_flight();
     let Commands { sender, tracks } = &mut model.commands;
     for track in tracks {
-        let (name, seen) = (track.kind.name(), track.kind.row().seen);
+        let CommandRow { name, seen, resend, moves, .. } = track.kind.row();
         // What is repeated until its answer ends when it can no longer help. That its effect shows
         // is no answer: an arming may still be on its way.
-        let repeats = track.kind.row().resend == Resend::UntilAnswered
-            && track.acknowledged == Acknowledgement::Waiting;
+        let repeats = resend == Resend::UntilAnswered && track.acknowledged == Acknowledgement::Waiting;
         if repeats && flies {
             sender.withdraw_one(track.ticket, now);
             track.acknowledged = Acknowledgement::GivenUp;
@@ -324,7 +317,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         }
         // Then the effect is that of another station's command.
         let denied = Acknowledgement::Answered(MavResult::MAV_RESULT_DENIED as u8);
-        if track.kind.moves() && track.acknowledged == denied {
+        if moves && track.acknowledged == denied {
             track.observed_at = None;
             continue;
         }
@@ -349,7 +342,10 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
     for (level, by, text) in told {
         model.tell_act(now, "observed", &by, level, text);
     }
-    stop_if_latched(model, now);
+    // A refusal counts only when it arrives: it may be another vehicle's.
+    if model.commands.of(CommandKind::Abort).is_some_and(|track| track.observed_at.is_some()) {
+        stop_if_confirmed(model, now);
+    }
 }
 
 // The automatic mode, for runs without a crew: arms and starts a simulated vehicle.
@@ -363,7 +359,7 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.down(now).carries() {
         return;
     }
-    let is_live = model.vehicle.boot.has_said_what_it_is() && !model.vehicle.is_simulated();
+    let is_live = model.vehicle.boot.has_said_what_it_is() && !model.vehicle.boot.is_simulated();
     if model.auto_step != AutoStep::Done && is_live {
         let why = "the vehicle is live: it does not report that it is simulated";
         model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
@@ -375,7 +371,7 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     let phase = model.vehicle.phase_now();
     match model.auto_step {
         AutoStep::WaitForReady { not_before } => match phase {
-            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && model.vehicle.is_simulated() => {
+            Some(TdPhase::TD_PHASE_PAD_ARMED) if armed && model.vehicle.boot.is_simulated() => {
                 start_auto(model, now);
             }
             // The flight has already begun, so there is nothing to start.
@@ -385,7 +381,7 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
             _ => arm_if_ready(model, not_before, now),
         },
         AutoStep::WaitForArmed => {
-            let ready = model.vehicle.is_simulated() && model.vehicle.unfit().is_none();
+            let ready = model.vehicle.boot.is_simulated() && model.vehicle.unfit().is_none();
             if armed && ready && phase == Some(TdPhase::TD_PHASE_PAD_ARMED) {
                 start_auto(model, now);
             }
@@ -434,7 +430,7 @@ fn why_not_ready(model: &Model, not_before: Duration, now: Duration) -> Option<S
     let Some(status) = model.vehicle.status.as_ref() else {
         return Some("the vehicle has not reported its checks".to_owned());
     };
-    let simulated = model.vehicle.is_simulated();
+    let simulated = model.vehicle.boot.is_simulated();
     (!simulated)
         .then(|| "the vehicle has not reported that it is simulated".to_owned())
         .or_else(|| status.is_stale(now).then(|| "the vehicle no longer reports its checks".to_owned()))
@@ -509,14 +505,14 @@ fn counts_down(model: &Model) -> bool {
 
 /// Sends a command once, without following it.
 pub(super) fn send_once(model: &mut Model, kind: CommandKind, param2: f32) {
-    let (command, param1) = kind.mav_command();
+    let CommandRow { mav: (command, param1), moves, .. } = kind.row();
     model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {
         command,
         param1,
         param2,
         target_system: model.settings.vehicle.system_id,
         target_component: model.settings.vehicle.component_id,
-        param7: if kind.moves() { model.vehicle.boot.parameter() } else { 0.0 },
+        param7: if moves { model.vehicle.boot.parameter() } else { 0.0 },
         ..COMMAND_LONG_DATA::default()
     })));
 }

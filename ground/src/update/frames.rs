@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::command::CommandAnswer;
-use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TIMESYNC_DATA};
+use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA};
 use protocol::frame::Frame;
 use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
@@ -11,9 +11,7 @@ use protocol::reported::boot_of;
 use protocol::text::Text;
 
 use super::{Action, commands, pad, vehicle_changes};
-use crate::model::{
-    BootId, Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms,
-};
+use crate::model::{Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
@@ -37,7 +35,13 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
             model.link.radio = Some((radio, now));
         }
     } else if frame.source() == model.settings.us {
-        on_own_address(model, frame, now);
+        // An echo of ours, unless its session is another.
+        if let Ok(MavMessage::HEARTBEAT(beat)) = frame.decode()
+            && beat.custom_mode != model.settings.session
+            && model.settings.role != Role::Replaying
+        {
+            model.link.same_id_at = Some(now);
+        }
     } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
         // After what the frame says: it may show that the abort is latched.
@@ -49,23 +53,13 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     }
 }
 
-/// A frame from our own address: an echo of ours, unless its session is another.
-fn on_own_address(model: &mut Model, frame: &Frame, now: Duration) {
-    if let Ok(MavMessage::HEARTBEAT(beat)) = frame.decode()
-        && beat.custom_mode != model.settings.session
-        && model.settings.role != Role::Replaying
-    {
-        model.link.same_id_at = Some(now);
-    }
-}
-
 fn note_stranger(model: &mut Model, source: Address, now: Duration) {
     let strangers = &mut model.link.strangers;
     if strangers.len() < STRANGERS_MAX && !strangers.contains(&source) {
         strangers.push(source);
         let Address { system_id, component_id } = source;
-        model
-            .info(now, format!("system {system_id} component {component_id} is also on the link; not shown"));
+        let which = format!("system {system_id} component {component_id}");
+        model.info(now, format!("{which} is also on the link; not shown"));
     }
 }
 
@@ -97,12 +91,28 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     if is_nobodys {
         return;
     }
-    if let MavMessage::TD_FLIGHT_STATUS(status) = &message
-        && model.boots.disowns(&report(status, frame, model.link.source), now)
-    {
-        return;
-    }
-    let speaker = speaker(model, frame, (&message, named), now);
+    // Which vehicle has sent it, and since which power-up; `None` before the first flight status.
+    let speaker = match &message {
+        MavMessage::TD_FLIGHT_STATUS(status) => {
+            let report = StatusReport {
+                uid: status.vehicle_uid,
+                boot: status.boot_number,
+                clock_ms: status.time_boot_ms,
+                sequence: frame.sequence(),
+                source: model.link.source,
+            };
+            if model.boots.disowns(&report, now) {
+                return;
+            }
+            Some(model.boots.hear(&report, now))
+        }
+        // What another autopilot says beside ours is noted at the shown one.
+        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
+        message => {
+            let said = (named, time_boot_ms(message), frame.sequence());
+            model.boots.speaker(model.link.source, said, now)
+        }
+    };
     if let Some(other) = speaker.filter(|boot| model.boots.shown() != Some(*boot)) {
         // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept
         // beside.
@@ -115,10 +125,6 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         }
     }
     model.link.date(&message, now);
-    if let Some(answer) = answer_to_ping(&message, frame.source()) {
-        model.outbox.push(Action::send(answer));
-        return;
-    }
     match &message {
         MavMessage::STATUSTEXT(chunk) => {
             for text in model.texts.push(frame.source(), chunk, now) {
@@ -147,51 +153,6 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     vehicle_changes::enter_crew_changes(model, &before, &after, now);
     pad::enter_check(model, now);
     commands::observe(model, now);
-}
-
-fn report(status: &TD_FLIGHT_STATUS_DATA, frame: &Frame, source: u16) -> StatusReport {
-    StatusReport {
-        uid: status.vehicle_uid,
-        boot: status.boot_number,
-        clock_ms: status.time_boot_ms,
-        sequence: frame.sequence(),
-        source,
-    }
-}
-
-/// Which vehicle has sent a message, and since which power-up; `None` before the first flight
-/// status.
-fn speaker(
-    model: &mut Model,
-    frame: &Frame,
-    (message, named): (&MavMessage, Option<u32>),
-    now: Duration,
-) -> Option<BootId> {
-    match message {
-        MavMessage::TD_FLIGHT_STATUS(status) => {
-            Some(model.boots.hear(&report(status, frame, model.link.source), now))
-        }
-        // What another autopilot says beside ours is noted at the shown one.
-        MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
-        _ => {
-            let said = (named, time_boot_ms(message), frame.sequence());
-            model.boots.speaker(model.link.source, said, now)
-        }
-    }
-}
-
-/// A PING with target 0 asks for an answer to its sender. A PING with any other target is an answer
-/// itself; answering it would never end.
-#[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
-fn answer_to_ping(message: &MavMessage, source: Address) -> Option<MavMessage> {
-    let MavMessage::PING(data) = message else { return None };
-    if data.target_system != 0 || data.target_component != 0 {
-        return None;
-    }
-    let mut answer = data.clone();
-    answer.target_system = source.system_id;
-    answer.target_component = source.component_id;
-    Some(MavMessage::PING(answer))
 }
 
 pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {

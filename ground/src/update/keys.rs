@@ -20,9 +20,9 @@ use crate::model::{
 };
 
 /// How many lines PgUp and PgDn scroll.
-const SCROLL_PAGE: i32 = 10;
+const SCROLL_PAGE: isize = 10;
 /// The furthest scroll position; no list is longer.
-const SCROLL_MAX: i32 = 4_000;
+const SCROLL_MAX: usize = 4_000;
 
 /// Keys from one read of the terminal: one if typed by hand, several from a paste, a held key or a
 /// slow line.
@@ -42,7 +42,10 @@ pub(super) fn on_paste(model: &mut Model, now: Duration) {
     model.record_operator(now, "key", &model.settings.seat.clone(), "a paste");
     model.key_timing.pasted(now);
     model.quit_at = None;
-    cancel(model, now);
+    model.pages.entry = None;
+    if let Some(dialog) = model.dialog.take() {
+        model.info(now, format!("{}: cancelled, nothing was done", dialog.prompt.name()));
+    }
     model.info(now, "a paste was dropped");
 }
 
@@ -143,10 +146,8 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
         model.abort_chord.forget_if_over(now);
     } else if model.abort_chord.take_late_enter(now) && model.dialog.is_none() && model.pages.entry.is_none()
     {
-        model.warn(
-            now,
-            "too late for the abort: its question had run out, NOTHING WAS SENT; Ctrl-X, then Enter",
-        );
+        let late = "too late for the abort: its question had run out, NOTHING WAS SENT; Ctrl-X, then Enter";
+        model.warn(now, late);
         return true;
     }
     // While the chord is begun, another key neither cancels it nor does anything else.
@@ -224,14 +225,6 @@ fn confirmed(model: &mut Model, prompt: Prompt, now: Duration) {
     request(model, wanted, now);
 }
 
-/// Closes the open dialog because something else came in between.
-fn cancel(model: &mut Model, now: Duration) {
-    model.pages.entry = None;
-    if let Some(dialog) = model.dialog.take() {
-        model.info(now, format!("{}: cancelled, nothing was done", dialog.prompt.name()));
-    }
-}
-
 /// Closes a dialog whose time limit has passed.
 fn expire(model: &mut Model, now: Duration) {
     if let Some(dialog) = model.dialog.take_if(|dialog| now > dialog.until) {
@@ -290,8 +283,8 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
         Key::PageDown => scroll(model, -SCROLL_PAGE),
-        Key::Home => scroll(model, SCROLL_MAX),
-        Key::End => scroll(model, -SCROLL_MAX),
+        Key::Home => scroll(model, isize::MAX),
+        Key::End => scroll(model, -isize::MAX),
         Key::Char(letter) if Act::meant_as_capital(letter).is_some() => {
             let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(Act::key_name);
             let words = format!("capital letters: {arm} arms, {start} starts, {disarm} disarms (caps lock?)");
@@ -368,12 +361,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 model.pages.hold(Some(Page::Pad));
             }
         }
-        Act::Report => ask_for_report(model, now),
+        Act::Report => {
+            let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
+            match why_nothing_flown(model).or(watches) {
+                Some(why) => model.info(now, format!("no report: {why}")),
+                None => request(model, Request::Report, now),
+            }
+        }
         Act::MovePin if act.works(model, now) => {
-            let is_out = model
-                .vehicle
-                .interlocks()
-                .is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
+            let is_out = model.vehicle.shows(TdInterlock::TD_INTERLOCK_PIN_OUT);
             model.info(now, if is_out { "somebody puts the pin in" } else { "somebody pulls the pin" });
             model.outbox.push(Action::MovePin(!is_out));
         }
@@ -390,24 +386,15 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
         Act::Note if act.works(model, now) => {
-            model.pages.entry = Some(TextEntry::Note { typed: String::new() });
+            model.pages.entry = Some(TextEntry::default());
         }
         Act::Note => model.info(now, "this screen only looks on; it keeps no notes"),
         Act::Palette => {
-            model.pages.entry = Some(TextEntry::Palette { typed: String::new(), chosen: 0 });
+            model.pages.entry = Some(TextEntry { chosen: Some(0), ..TextEntry::default() });
         }
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
-    }
-}
-
-/// Has the report written, by the station.
-fn ask_for_report(model: &mut Model, now: Duration) {
-    let watches = (model.settings.role == Role::Watching).then_some("this screen only watches");
-    match why_nothing_flown(model).or(watches) {
-        Some(why) => model.info(now, format!("no report: {why}")),
-        None => request(model, Request::Report, now),
     }
 }
 
@@ -462,11 +449,9 @@ fn choose_step(model: &mut Model, up: bool, now: Duration) {
 
 /// Scrolls up by this many lines; down if negative. Events are listed from the newest line, link
 /// values from the first.
-fn scroll(model: &mut Model, up: i32) {
+fn scroll(model: &mut Model, up: isize) {
     let away = if model.page() == Page::Link { -up } else { up };
-    let lines = i32::try_from(model.pages.scroll).unwrap_or(SCROLL_MAX);
-    let scrolled = lines.saturating_add(away).clamp(0, SCROLL_MAX);
-    model.pages.scroll = usize::try_from(scrolled).unwrap_or(0);
+    model.pages.scroll = model.pages.scroll.saturating_add_signed(away).min(SCROLL_MAX);
 }
 
 /// Does what the crew has asked for and tells the other screens, or asks the station to.
@@ -481,7 +466,7 @@ pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
 
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
-    let Some(kind) = model.pointed_at().map(|alarm| alarm.what.kind) else { return };
+    let Some(kind) = model.pointed_at().map(|at| model.alarms.list()[at].what.kind) else { return };
     // The station does not know of its own silence.
     if model.settings.role == Role::Attached && kind != AlarmKind::StationSilent {
         model.outbox.push(Action::Request(Request::Acknowledge(kind)));
@@ -502,10 +487,7 @@ pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
 /// Chooses the next or the previous alarm of the list.
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
-    let at = model
-        .pointed_at()
-        .and_then(|chosen| list.iter().position(|alarm| alarm.what.kind == chosen.what.kind));
-    if let Some(at) = at {
+    if let Some(at) = model.pointed_at() {
         model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].what.kind);
     }
 }
@@ -535,24 +517,17 @@ const TYPED_MAX: usize = crate::attach::NOTE_MAX;
 
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
 fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
-    let (mut typed, mut chosen) = match model.pages.entry.take() {
-        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
-        Some(TextEntry::Note { mut typed }) => {
-            return match key {
-                Key::Enter if !typed.trim().is_empty() => request(model, Request::Note(typed), now),
-                Key::Enter | Key::Escape => {}
-                _ => {
-                    edit(&mut typed, key);
-                    model.pages.entry = Some(TextEntry::Note { typed });
-                }
-            };
-        }
-        // Only a replay asks where to jump, and takes those keys itself.
-        None => return,
-    };
+    let Some(TextEntry { mut typed, chosen }) = model.pages.entry.take() else { return };
     match key {
-        Key::Escape => return,
-        Key::Enter => {
+        Key::Backspace => drop(typed.pop()),
+        Key::Char(letter) if typed.chars().count() < TYPED_MAX => typed.push(letter),
+        _ => {}
+    }
+    let chosen = match (key, chosen) {
+        (Key::Escape, _) => return,
+        (Key::Enter, None) if typed.trim().is_empty() => return,
+        (Key::Enter, None) => return request(model, Request::Note(typed), now),
+        (Key::Enter, Some(chosen)) => {
             let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
             return match entry.map(|entry| entry.action) {
                 Some(PaletteAction::Act(act))
@@ -565,14 +540,13 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
                 None => {}
             };
         }
-        Key::Up => chosen = chosen.saturating_sub(1),
-        Key::Down => chosen = (chosen + 1).min(palette_entries(model, &typed, now).len().saturating_sub(1)),
-        _ => {
-            edit(&mut typed, key);
-            chosen = 0;
+        (Key::Up, Some(chosen)) => Some(chosen.saturating_sub(1)),
+        (Key::Down, Some(chosen)) => {
+            Some((chosen + 1).min(palette_entries(model, &typed, now).len().saturating_sub(1)))
         }
-    }
-    model.pages.entry = Some(TextEntry::Palette { typed, chosen });
+        _ => chosen.map(|_| 0),
+    };
+    model.pages.entry = Some(TextEntry { typed, chosen });
 }
 
 /// Does what an entry of the palette says. It goes the way of its key, so it never does more than
@@ -593,13 +567,5 @@ fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);
         }
-    }
-}
-
-pub(crate) fn edit(text: &mut String, key: Key) {
-    match key {
-        Key::Backspace => drop(text.pop()),
-        Key::Char(letter) if text.chars().count() < TYPED_MAX => text.push(letter),
-        _ => {}
     }
 }

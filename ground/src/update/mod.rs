@@ -172,10 +172,9 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
             let why = if model.is_at_risk() { "armed or in flight" } else { "people must keep away" };
-            model.warn(
-                now,
-                format!("the screen was quit; {why}, so the station continues: `ground attach` shows it"),
-            );
+            let text =
+                format!("the screen was quit; {why}, so the station continues: `ground attach` shows it");
+            model.warn(now, text);
         }
         Msg::ScreenGone => {
             model.warn(now, "the terminal is gone: link and log continue; `ground attach` shows them");
@@ -278,14 +277,9 @@ fn on_station_tick(model: &mut Model, now: Duration) {
 fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<SigningCounters>, now: Duration) {
     let rejected = |counters: Option<SigningCounters>| counters.map_or(0, |counters| counters.rejected());
     if rejected(signing) > 0 && rejected(model.link.signing) == 0 {
-        let what = signing.unwrap_or_default();
-        model.warn(
-            now,
-            format!(
-                "frames refused: {} unsigned, {} wrongly signed, {} replayed, {} too old, {} too new",
-                what.unsigned, what.wrong, what.replayed, what.too_old, what.too_new
-            ),
-        );
+        let SigningCounters { unsigned, wrong, replayed, too_old, too_new, .. } = signing.unwrap_or_default();
+        let signatures = format!("{unsigned} unsigned, {wrong} wrongly signed, {replayed} replayed");
+        model.warn(now, format!("frames refused: {signatures}, {too_old} too old, {too_new} too new"));
     }
     if rejected(signing) > rejected(model.link.signing) {
         model.link.refused_at = Some(now);

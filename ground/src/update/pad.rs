@@ -37,9 +37,8 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
             change_checklist(model, ChecklistEntry::Marked { step, mark });
             let verb = if void { "voided" } else { "signed" };
             let text = signature_words(model, step, &signature, verb, by);
-            model.record_operator(now, verb, by, &text);
             let level = if void { EventLevel::Warning } else { EventLevel::Info };
-            model.tell(now, Speaker::Ground, level, text);
+            model.tell_act(now, verb, by, level, text);
         }
         Err(why) => refuse_signature(model, (step, void), by, &why, now),
     }
@@ -183,18 +182,15 @@ pub(super) fn enter_check(model: &mut Model, now: Duration) {
 
 fn check_words(check: &PadCheck) -> String {
     let state = words::lower_case(&check.told.state, "TD_PAD_CHECK_STATE_").to_uppercase();
-    let mut text = format!("check {} {state}: {} values", check.told.run, check.told.found);
     let failing: Vec<String> = check.failing().map(value_words).collect();
-    if !failing.is_empty() {
-        text = format!("{text}, outside: {}", failing.join("; "));
-    }
-    text
+    let outside =
+        if failing.is_empty() { String::new() } else { format!(", outside: {}", failing.join("; ")) };
+    format!("check {} {state}: {} values{outside}", check.told.run, check.told.found)
 }
 
 /// A value with its limit, as in `fin 2 range 0.0 deg (least 87.7)`.
 fn value_words(value: &TD_PAD_CHECK_DATA) -> String {
-    let (name, unit, factor, decimals) = shown(value);
-    let number = |number: f32| words::fixed(factor * f64::from(number), decimals);
+    let (name, unit, number) = shown(value);
     let mut text = format!("{name} {} {unit}", number(value.value));
     for (word, limit) in [("least", value.least), ("most", value.most)] {
         if limit.is_finite() {

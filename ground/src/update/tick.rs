@@ -73,7 +73,12 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     keep_place(model, now);
     vehicle_changes::keep_unfinished(model, now);
     if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
-        let telemetry = telemetry_record(model, now);
+        let telemetry = Telemetry {
+            link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
+            link_loss: model.link.loss(now),
+            link_rx_bytes_s: Some(model.link.stats.figures(now).rx_bytes_s),
+            ..model.vehicle.told.record(now.as_secs_f64())
+        };
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));
     }
     if !model.settings.interactive
@@ -172,15 +177,6 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
         }
     };
     Some(why.to_owned())
-}
-
-fn telemetry_record(model: &Model, now: Duration) -> Telemetry {
-    Telemetry {
-        link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
-        link_loss: model.link.loss(now),
-        link_rx_bytes_s: Some(model.link.stats.figures(now).rx_bytes_s),
-        ..model.vehicle.told.record(now.as_secs_f64())
-    }
 }
 
 // Follows the last place of the vehicle, and has it kept, so that a lost vehicle can be found also

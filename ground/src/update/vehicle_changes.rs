@@ -9,8 +9,8 @@ use protocol::log::record::EventLevel;
 
 use super::{Action, commands, pad};
 use crate::model::{
-    Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, FlownPath, History, KeepAway, Model,
-    RestOfWord, Role, Sample, Seat, Speaker, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
+    Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, History, KeepAway, Model, RestOfWord,
+    Role, Sample, Seat, Speaker, TIMELINE_MAX, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
     is_on_pad, latch_words, words,
 };
 
@@ -112,10 +112,8 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
         model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
         settle(model, now);
     } else {
-        model.warn(
-            now,
-            format!("boot {name} is not chosen: it is not heard, or more than one vehicle has it"),
-        );
+        let why = "it is not heard, or more than one vehicle has it";
+        model.warn(now, format!("boot {name} is not chosen: {why}"));
     }
 }
 
@@ -221,7 +219,7 @@ pub(super) fn watch_approach(model: &mut Model, now: Duration) {
             let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
             model.say(now, Speaker::Ground, level, away.sentence());
         }
-        (Some(Approach::DoNot(_) | Approach::OneForThePin(_)) | None, None) => {}
+        (Some(Approach::Away(_)) | None, None) => {}
     }
 }
 
@@ -230,14 +228,17 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
     if is_flight(phase) && !before.is_some_and(is_flight) && !model.outcome.started {
         model.history.silence = Duration::ZERO;
     }
-    model.history.note_phase(phase, now);
+    let timeline = &mut model.history.timeline;
+    if timeline.len() < TIMELINE_MAX && timeline.last().is_none_or(|(last, _)| *last != phase) {
+        timeline.push((phase, now));
+    }
     model.info(now, format!("phase {from}{}", words::phase(phase)));
     model.outbox.push(Action::SyncLog);
     // The flight itself may have passed unheard.
     let after_it = !is_on_pad(phase) && before.is_some_and(is_on_pad);
     if after_it || (is_flight(phase) && !before.is_some_and(is_flight)) {
         if !model.outcome.started {
-            model.vehicle.flown = FlownPath::default();
+            model.vehicle.flown.clear();
         }
         model.outcome.started = true;
         pad::reopen_checklist(model, now);
@@ -322,7 +323,7 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &
             TdHold::TD_HOLD_TAP_OVERDUE => lines.push((0, format!("HOLD: no tap {whose}"))),
             TdHold::TD_HOLD_UPLINK_SILENT => lines.push((0, format!("HOLD: station {whose} not received"))),
             TdHold::TD_HOLD_STATION_DEAF => {
-                lines.push((0, format!("HOLD: station {whose} receives nothing")))
+                lines.push((0, format!("HOLD: station {whose} receives nothing")));
             }
             TdHold::TD_HOLD_NONE | TdHold::TD_HOLD_CHECK_FAILED => {}
         }

@@ -106,8 +106,8 @@ fn strong(role: TextRole) -> TextRole {
     if role == TextRole::Plain { TextRole::Title } else { role }
 }
 
-/// Phase, and fins and gimbal as numbers: measured, and commanded behind the stroke, degrees. It has
-/// the same columns in every phase.
+/// Phase, and fins and gimbal as numbers: measured, and commanded behind the stroke, degrees. It
+/// has the same columns in every phase.
 pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let vehicle = &model.vehicle;
     let mark = |stale: bool| if stale { STALE_MARK } else { " " };
@@ -120,10 +120,8 @@ pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
     let whole = |deg: f64| format!("{:>2}", fixed(deg, 0));
     // Of a large deflection the tenth says nothing.
     let signed = |deg: f64| {
-        format!(
-            "{:>4}",
-            format!("{}{}", if deg < 0.0 { "" } else { "+" }, fixed(deg, usize::from(deg.abs() < 9.95)))
-        )
+        let sign = if deg < 0.0 { "" } else { "+" };
+        format!("{:>4}", sign.to_owned() + &fixed(deg, usize::from(deg.abs() < 9.95)))
     };
     let (fins, gimbal) = (vehicle.fins(), vehicle.gimbal());
     let each: Vec<String> =
@@ -132,6 +130,7 @@ pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
     let of = |plane: fn(&Gimbal) -> Deflection| {
         format!("{:>9}", pair(gimbal.map(|gimbal| plane(&gimbal.value)), signed))
     };
+    let (pitch, yaw) = (of(|gimbal| gimbal.pitch), of(|gimbal| gimbal.yaw));
     let fins_stale = fins.is_some_and(|fins| fins.is_stale(now));
     let gimbal_stale = gimbal.is_some_and(|gimbal| gimbal.is_stale(now));
     Line::from(vec![
@@ -139,12 +138,7 @@ pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
         theme.label(" fins deg/cmd"),
         theme.plain(format!("{}{}", mark(fins_stale), each.join(" "))),
         theme.label(" gimbal"),
-        theme.plain(format!(
-            "{}P{} Y{}",
-            mark(gimbal_stale),
-            of(|gimbal| gimbal.pitch),
-            of(|gimbal| gimbal.yaw)
-        )),
+        theme.plain(format!("{}P{pitch} Y{yaw}", mark(gimbal_stale))),
     ])
 }
 

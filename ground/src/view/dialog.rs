@@ -10,8 +10,8 @@ use ratatui::widgets::{Block, Clear};
 
 use super::{TextRole, Theme, draw_lines, lists};
 use crate::model::{
-    AGAIN_KEY, Act, CONFIRM_WORD, Foreign, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
-    palette_entries, role_name, why_not_here, why_not_quit, why_untested,
+    AGAIN_KEY, Act, CONFIRM_WORD, Model, PadCheck, Prompt, Role, SURFACES, TERMINATION, TextEntry,
+    foreign_name, palette_entries, role_name, why_not_here, why_not_quit, why_untested,
 };
 
 const BOX_COLUMNS: u16 = 68;
@@ -35,6 +35,7 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
         ];
         return Some(("DID YOU TYPE THIS?", lines));
     }
+    let cancels = || plain("Any other key cancels.".to_owned());
     let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
     let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2));
     let asks = |own| plain(format!("This only asks: {} must confirm within 10 s.", other_roles(own)));
@@ -54,7 +55,7 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
             ("TAKE COMMAND of an armed vehicle", vec![who], vec![any_other_key()])
         }
         Prompt::AbortForeign => {
-            let name = model.vehicle.as_foreign().map_or_else(|| "The vehicle".to_owned(), Foreign::name);
+            let name = model.vehicle.as_foreign().map_or_else(|| "The vehicle".to_owned(), foreign_name);
             let does = format!("{name}: flight termination {TERMINATION}.");
             let does = lists::wrap(&does, usize::from(BOX_COLUMNS) - 4).into_iter().map(strong).collect();
             ("ABORT of a vehicle that is NOT A TOUCHDOWN VEHICLE", does, vec![any_other_key()])
@@ -95,28 +96,26 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
             } else {
                 format!("Nothing moves. Enter {left} begins.")
             };
-            let then = ["Then the sensors are watched for 5 s: touch nothing.", "Any other key cancels."];
-            ("CHECK the vehicle", vec![strong(begins)], then.map(|words| plain(words.to_owned())).to_vec())
+            let then = plain("Then the sensors are watched for 5 s: touch nothing.".to_owned());
+            ("CHECK the vehicle", vec![strong(begins)], vec![then, cancels()])
         }
         Prompt::Seen => {
             let saw = SURFACES.map(|(_, _, words)| plain(words.to_owned()));
-            let below = vec![plain("It takes two people.".to_owned())];
-            ("SEEN, in this order and nothing else?", saw.to_vec(), below)
+            let below = plain("It takes two people.".to_owned());
+            ("SEEN, in this order and nothing else?", saw.to_vec(), vec![below])
         }
         Prompt::Sign { step: number, void } => {
             let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
-            let words = step.map(|step| step.words.clone()).unwrap_or_default();
-            let who = step.and_then(|step| step.role).map_or("Anybody who commands", role_name);
+            let words = step.map_or("", |step| step.words.as_str());
+            let who = step.and_then(|step| step.role).map(role_name);
+            let who = who.unwrap_or_else(|| "Anybody who commands".to_owned());
             let verb = if void { "voids the signature" } else { "signs" };
             let above =
                 vec![plain(format!("{}: {words}", number + 1)), strong(format!("Enter {left} {verb}."))];
             let title = if void { "VOID a step of the checklist" } else { "SIGN a step of the checklist" };
             (title, above, vec![plain(format!("{who} signs it. Any other key cancels."))])
         }
-        Prompt::Disarm => {
-            let disarms = strong(format!("Enter {left} disarms."));
-            ("DISARM", vec![disarms], vec![plain("Any other key cancels.".to_owned())])
-        }
+        Prompt::Disarm => ("DISARM", vec![strong(format!("Enter {left} disarms."))], vec![cancels()]),
     };
     let typing = dialog.prompt.word().map(|word| {
         strong(format!("Type {word} and Enter {left}:  [{:<width$}]", dialog.typed, width = word.len()))
@@ -224,11 +223,9 @@ const KEY_COLUMNS: usize = 7;
 
 pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     // A note leaves the page to be seen.
-    let (title, rows) = match model.pages.entry {
-        Some(TextEntry::Palette { .. }) => ("Every action", area.height),
-        Some(TextEntry::Note { .. }) => ("Note for log and book", FRAME_ROWS + 1),
-        _ => return,
-    };
+    let Some(entry) = &model.pages.entry else { return };
+    let note = ("Note for log and book", FRAME_ROWS + 1);
+    let (title, rows) = entry.chosen.map_or(note, |_| ("Every action", area.height));
     let width = PALETTE_COLUMNS.min(area.width);
     let area = Rect { y: area.bottom().saturating_sub(rows), height: rows, ..area };
     let at = Rect { x: area.x + (area.width - width) / 2, width, ..area }.intersection(frame.area());
@@ -240,13 +237,10 @@ pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
 /// The typed text and this many of the actions found, the marked one among them. Empty while it is
 /// closed.
 pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
-    let (typed, chosen) = match &model.pages.entry {
-        Some(TextEntry::Palette { typed, chosen }) => (typed, chosen),
-        Some(TextEntry::Note { typed }) => {
-            let keys = theme.label(" Enter keeps it, Esc does not");
-            return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
-        }
-        _ => return Vec::new(),
+    let Some(TextEntry { typed, chosen }) = &model.pages.entry else { return Vec::new() };
+    let Some(chosen) = chosen else {
+        let keys = theme.label(" Enter keeps it, Esc does not");
+        return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
     };
     let entries = palette_entries(model, typed, now);
     let head = Line::from(vec![

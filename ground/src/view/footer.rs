@@ -14,8 +14,8 @@ use super::lists::said;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Danger, Event, KeepAway, Model, Page, dead_reckoning::foreseen, dead_reckoning::is_unheard,
-    is_burning, is_flight, is_on_pad, words,
+    Act, Event, KeepAway, Model, Page, dead_reckoning::foreseen, dead_reckoning::is_unheard, is_burning,
+    is_flight, is_on_pad, words,
 };
 use crate::view::pictures::seconds_since;
 
@@ -239,7 +239,7 @@ pub fn draw_keys(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let rings = model.alarms.unacknowledged() > 0;
     // In flight no command but the abort does anything, and the page matters.
     let holds = model.vehicle.in_flight() && model.pages.held.is_none();
-    let away = KeepAway::of(&model.vehicle, now).is_some_and(|away| away.danger != Danger::LiveWaited);
+    let away = KeepAway::of(&model.vehicle, now).is_some_and(|away| !away.is_for_the_pin());
     let matters = |act: &Act| match act {
         Act::Acknowledge => rings,
         Act::Hold => holds,

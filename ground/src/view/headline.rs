@@ -9,7 +9,7 @@ use super::pictures::map::comes_down;
 use super::top_lines::readiness;
 use super::{STALE_MARK, TextRole};
 use crate::model::{
-    AlarmKind, Approach, Ending, Model, Sample, Spot, Vehicle,
+    AlarmKind, Approach, Ending, Model, Sample, Spot,
     dead_reckoning::{is_unheard, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
@@ -48,8 +48,8 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let mark = if stale { STALE_MARK } else { " " };
         let ending = ending.map_or_else(String::new, |ending| format!("{}; ", ending.word()));
         let role = match approach {
-            Approach::DoNot(_) => TextRole::Alarm,
-            Approach::OneForThePin(_) => TextRole::Caution,
+            Approach::Away(away) if away.is_for_the_pin() => TextRole::Caution,
+            Approach::Away(_) => TextRole::Alarm,
             Approach::May(_) => TextRole::Good,
         };
         let words = approach.headline();
@@ -63,7 +63,7 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         }
         None if may_have_left(vehicle, now).is_some() => may_fly(model),
         _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, commanded_by_nobody()),
-        None if has_not_lit(vehicle) => {
+        None if vehicle.in_flight() && vehicle.shows(TdInterlock::TD_INTERLOCK_NO_LIGHT) => {
             let chute = vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
             let then = if chute { "parachute commanded" } else { "no parachute commanded" };
             Banner::alarm(NO_LIGHT, format!(": the landing motor gave no thrust; {then}"))
@@ -74,12 +74,6 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         }
         _ => return None,
     })
-}
-
-/// Whether it is in flight with a landing motor that was commanded and gave no thrust.
-fn has_not_lit(vehicle: &Vehicle) -> bool {
-    let no_light = |locks: TdInterlock| locks.contains(TdInterlock::TD_INTERLOCK_NO_LIGHT);
-    vehicle.in_flight() && vehicle.interlocks().is_some_and(no_light)
 }
 
 /// Since when, and where it is meant to come down. The moment stands still; the clock in the line
@@ -164,7 +158,7 @@ fn lost(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let silence_s = model.vehicle.best_motion().map(|motion| motion.age(now).as_secs_f64());
     let others = vec![
         number("PREDICTED m up", at.and_then(|at| sample(at.altitude_m)), 0, 4, now).predicted(),
-        number("error m", at.and_then(|at| sample(at.error_m)), 0, 4, now).predicted(),
+        number("error m", at.and_then(|at| sample(at.spot.error_m)), 0, 4, now).predicted(),
     ];
     (number("LINK LOST, silent s", silence_s.and_then(sample), 0, 4, now), others)
 }

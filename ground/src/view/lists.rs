@@ -36,7 +36,7 @@ pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<L
                 EventLevel::Error | EventLevel::Fatal => TextRole::Alarm,
             };
             let time = format!("{:>TIME_COLUMNS$} ", clock_time(event.at, lift_off));
-            let head = if is_narrow { time } else { format!("{time}{:<7} ", event.speaker.name()) };
+            let head = if is_narrow { time } else { format!("{time}{:<7} ", event.speaker) };
             let columns = if text_columns < WRAP_COLUMNS_MIN { usize::MAX } else { text_columns };
             let mut pieces = wrap(&text, columns).into_iter();
             let first = format!("{}{}", event.mark(), pieces.next().unwrap_or_default());
@@ -164,7 +164,7 @@ fn below(step: &Step) -> String {
         .value
         .as_ref()
         .map_or_else(String::new, |limits| format!(": {} {}", limits.quantity.name, limits.words()));
-    let who = step.role.map_or("anybody", role_name);
+    let who = step.role.map_or_else(|| "anybody".to_owned(), role_name);
     let signer = |by: &str| if by.is_empty() { "somebody".to_owned() } else { by.to_owned() };
     match &step.mark {
         Mark::Open => format!("{who} signs{limits}"),

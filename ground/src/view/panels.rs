@@ -81,7 +81,7 @@ pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> 
         let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
         let limit = match bit {
             TdLimit::TD_LIMIT_HEIGHT => String::new(),
-            TdLimit::TD_LIMIT_DISTANCE if !(most > 0.0) => String::new(),
+            TdLimit::TD_LIMIT_DISTANCE if most.is_nan() || most <= 0.0 => String::new(),
             _ if limits.is_none() => format!("-- {unit}"),
             _ => format!("±{} {unit}", shortest(most)),
         };
@@ -111,7 +111,7 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         ];
     };
     let row = |label: &str, value: f64| {
-        let words = theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.error_m, 1)));
+        let words = theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.spot.error_m, 1)));
         Line::from_iter([theme.label(format!(" {label:<6}pred")), theme.span(words, TextRole::Stale)])
     };
     let source = match at.basis {
@@ -123,8 +123,8 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
     };
     vec![
         row("alt", at.altitude_m),
-        row("north", at.x_m),
-        row("east", at.y_m),
+        row("north", at.spot.north_m),
+        row("east", at.spot.east_m),
         theme.line(format!(" {source}"), TextRole::Label),
         theme.line(format!(" last heard {} ago", seconds(at.age)), TextRole::Caution),
     ]

@@ -112,16 +112,6 @@ fn within(left_s: Option<f64>) -> String {
         .map_or_else(String::new, |left_s| format!(" in {} s", fixed(left_s, 1)))
 }
 
-// One line about the link.
-
-/// What arrives, and how much is lost.
-pub fn link_line(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
-    let received = format!(" rx {:.0}{capacity} B/s", model.link.stats.figures(now).rx_bytes_s);
-    let loss = model.link.loss(now);
-    Line::from(vec![theme.plain(received), theme.span(format!("  loss {}", percent(loss)), loss_role(loss))])
-}
-
 /// A loss of more than a twentieth is marked.
 pub fn loss_role(loss: Option<f64>) -> TextRole {
     if loss > Some(0.05) { TextRole::Caution } else { TextRole::Plain }
@@ -160,14 +150,9 @@ const TEXT_COLUMNS_MIN: usize = 12;
 /// The position of a replay, and its keys.
 pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
     let (at, of) = (playing.position.as_secs_f64(), playing.length.as_secs_f64());
-    let state = if playing.paused { "PAUSED" } else { "plays" };
-    theme.line(
-        format!(
-            " REPLAY {state} {at:.1} of {of:.1} s x{}  Space Left Right [ ] + -",
-            shortest(playing.speed)
-        ),
-        TextRole::Title,
-    )
+    let (state, speed) = (if playing.paused { "PAUSED" } else { "plays" }, shortest(playing.speed));
+    let words = format!(" REPLAY {state} {at:.1} of {of:.1} s x{speed}  Space Left Right [ ] + -");
+    theme.line(words, TextRole::Title)
 }
 
 /// The foremost alarm, its age and the number of further alarms. Only the text of the alarm is

@@ -10,6 +10,7 @@ use std::borrow::Cow;
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
+use strum::VariantArray;
 
 /// The role of a piece of text.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -33,7 +34,7 @@ pub enum TextRole {
 
 /// A part of a picture: what was measured, what is predicted and what limits have one colour each,
 /// everywhere.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray)]
 pub enum Ink {
     /// Drawn as a thick line.
     Measured,
@@ -48,13 +49,8 @@ pub enum Ink {
     Scale,
 }
 
-impl Ink {
-    pub const ALL: [Self; 6] =
-        [Self::Measured, Self::Predicted, Self::Limit, Self::Body, Self::Flame, Self::Scale];
-}
-
 /// How dangerous the vehicle is: the colour of the row of its state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, VariantArray)]
 pub enum Level {
     /// Disarmed on its pad, or not known.
     Calm,
@@ -66,12 +62,8 @@ pub enum Level {
     Free,
 }
 
-impl Level {
-    pub const ALL: [Self; 4] = [Self::Calm, Self::Armed, Self::Danger, Self::Free];
-}
-
 /// A set of colours.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, VariantArray)]
 pub enum Palette {
     #[default]
     Dark,
@@ -82,11 +74,9 @@ pub enum Palette {
 }
 
 impl Palette {
-    pub const ALL: [Self; 3] = [Self::Dark, Self::Light, Self::None];
-
     #[must_use]
     pub fn next(self) -> Self {
-        Self::ALL[(self as usize + 1) % Self::ALL.len()]
+        Self::VARIANTS[(self as usize + 1) % Self::VARIANTS.len()]
     }
 
     /// `None` if the background is the terminal's own.
@@ -110,9 +100,9 @@ struct Colours {
     good: u8,
     caution: u8,
     border: u8,
-    /// In the order of [`Ink::ALL`].
+    /// In the order of [`Ink`].
     inks: [u8; 6],
-    /// Text and background, in the order of [`Level::ALL`].
+    /// Text and background, in the order of [`Level`].
     levels: [(u8, u8); 4],
 }
 

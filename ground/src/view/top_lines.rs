@@ -17,7 +17,8 @@ use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, s
 use crate::model::{
     Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role,
     STALE_AFTER, Sample, Standing, TERMINATION, TrackedCommand, abort_too_late,
-    dead_reckoning::may_have_left, hold_words, is_liftoff_by_itself, is_on_pad, standing, why_no_go, words,
+    dead_reckoning::may_have_left, foreign_name, hold_words, is_liftoff_by_itself, is_on_pad, standing,
+    why_no_go, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -40,8 +41,12 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         right.extend([theme.span(words, TextRole::Alarm), Span::raw(" ")]);
     }
     if shows_rates {
-        right.extend(status_lines::link_line(model, theme, now).spans);
-        right.push(Span::raw("  "));
+        let capacity =
+            model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+        let received = format!(" rx {:.0}{capacity} B/s", model.link.stats.figures(now).rx_bytes_s);
+        let loss = model.link.loss(now);
+        let lost = format!("  loss {}  ", status_lines::percent(loss));
+        right.extend([theme.plain(received), theme.span(lost, status_lines::loss_role(loss))]);
     }
     right.extend(link(model, theme, now).spans);
     right.push(status_lines::recording(model, theme, now));
@@ -56,8 +61,8 @@ pub fn level(model: &Model, now: Duration) -> Level {
     use TdPhase as P;
     let vehicle = &model.vehicle;
     match Approach::of(vehicle, now) {
-        Some(Approach::DoNot(_)) => return Level::Danger,
-        Some(Approach::OneForThePin(_)) => return Level::Armed,
+        Some(Approach::Away(away)) if away.is_for_the_pin() => return Level::Armed,
+        Some(Approach::Away(_)) => return Level::Danger,
         Some(Approach::May(_)) => return Level::Free,
         None => {}
     }
@@ -139,7 +144,7 @@ pub fn identity(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
 
 /// A vehicle counts as real unless it has always reported to be simulated.
 fn mode(model: &Model, theme: Theme) -> Span<'static> {
-    let simulated = model.vehicle.is_simulated();
+    let simulated = model.vehicle.boot.is_simulated();
     let (word, role) = match model.settings.role {
         Role::Station if model.settings.demonstration => {
             let style = theme.style(TextRole::Caution).add_modifier(Modifier::REVERSED);
@@ -161,7 +166,7 @@ fn doubt(model: &Model, now: Duration) -> Option<String> {
     let misfits = || "ANOTHER VERSION: its messages do not fit".to_owned();
     match model.vehicle.as_foreign() {
         _ if model.beside(now).is_some() => Some(format!("TWO VEHICLES under id {id}")),
-        Some(foreign) => Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign.name())),
+        Some(foreign) => Some(format!("NOT A TOUCHDOWN VEHICLE: {}", foreign_name(foreign))),
         None => model.speaks_another_version(now).then(misfits),
     }
 }
@@ -240,7 +245,7 @@ pub fn abort_key(model: &Model) -> String {
 pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     match model.vehicle.phase() {
         None if let Some(foreign) = model.vehicle.as_foreign() => {
-            theme.plain(format!(" mode {}", foreign.custom_mode))
+            theme.plain(format!(" mode {}", foreign.value.custom_mode))
         }
         None => theme.label(" no vehicle"),
         Some(_) if may_have_left(&model.vehicle, now).is_some() => {
@@ -365,7 +370,7 @@ pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line
 /// In the countdown: until when a hold works.
 fn hold_until(model: &Model, now: Duration) -> Option<String> {
     let may_fly = may_have_left(&model.vehicle, now).is_some();
-    let last_s = model.last_hold_s().filter(|_| model.vehicle.counts_down() && !may_fly)?;
+    let last_s = model.last_hold_s(&model.vehicle).filter(|_| model.vehicle.counts_down() && !may_fly)?;
     if model.is_past_hold(now) {
         return Some("; TOO LATE to hold".to_owned());
     }
@@ -417,7 +422,7 @@ pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'sta
 /// time is left out.
 fn command_facts(track: &TrackedCommand, columns: usize, theme: Theme, now: Duration) -> Line<'static> {
     // Other names are longer.
-    let room = "DISARM".len().saturating_sub(track.kind.name().len());
+    let room = "DISARM".len().saturating_sub(track.kind.row().name.len());
     let at_s = track.commanded_at.as_secs_f64();
     let commanded = format!("{:room$} commanded {at_s:.1} s x", "");
     let lines = [
@@ -445,7 +450,7 @@ fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) 
     };
     let [commanded, ack, obs] = names;
     Line::from(vec![
-        theme.span(format!(" {}", track.kind.name()), TextRole::Title),
+        theme.span(format!(" {}", track.kind.row().name), TextRole::Title),
         theme.plain(format!("{commanded}{}", track.attempts)),
         theme.label(ack.to_owned()),
         theme.span(acknowledged, acknowledged_role),

@@ -166,7 +166,7 @@ fn attaching_does_not_ring_for_past_alarms() {
         rig.speaks = true;
         rig.run(seconds_after);
         assert_eq!(bells(&rig), 0, "the past rings");
-        rig.model.history_ends();
+        rig.model.alarms.history_ends();
         rig
     };
     let mut over = attached(60.0);
@@ -190,7 +190,7 @@ fn a_screen_says_that_its_station_is_silent() {
     for role in [Role::Attached, Role::Watching] {
         let mut rig = Rig::new(Settings { role, ..settings(false, true) });
         rig.run(5.0);
-        rig.model.history_ends();
+        rig.model.alarms.history_ends();
         rig.run(1.0);
         let hangs = |rig: &mut Rig, seconds: u64| {
             for _ in 0..10 * seconds {
@@ -294,7 +294,10 @@ fn alarms_are_listed_and_acknowledged_one_by_one() {
     rig.key(Key::Char('8'));
     let screen = rig.screen(80, 24);
     assert!(screen.contains("[8Alarms]") && screen.contains("2 of 2 not seen"), "{screen}");
-    assert_eq!(rig.model.pointed_at().map(|alarm| alarm.what.kind), Some(AlarmKind::NoLight));
+    assert_eq!(
+        rig.model.pointed_at().map(|at| rig.model.alarms.list()[at].what.kind),
+        Some(AlarmKind::NoLight)
+    );
     rig.keys(&[Key::Up, Key::Char(' ')]);
     rig.run(0.1);
     let listed = rig.model.alarms.list().iter().map(|alarm| (alarm.what.kind, alarm.acknowledged));

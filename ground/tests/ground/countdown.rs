@@ -211,12 +211,12 @@ fn the_last_moment_of_a_hold_counts_the_round_trip() {
             break;
         }
     }
-    let last_s = pad.model.last_hold_s().expect("told");
+    let last_s = pad.model.last_hold_s(&pad.model.vehicle).expect("told");
     assert!((2.9..3.2).contains(&last_s), "{last_s}");
     pad.ask(CommandKind::Hold);
     assert!(!pad.launches());
     let mut pad = Pad::counting_until(500, 2.4);
     pad.ask(CommandKind::Hold);
     assert!(pad.launches(), "too late, and the screen says so");
-    assert!(pad.model.last_hold_s().is_some_and(|last_s| last_s > 2.9));
+    assert!(pad.model.last_hold_s(&pad.model.vehicle).is_some_and(|last_s| last_s > 2.9));
 }

@@ -72,7 +72,7 @@ fn heard_until(flight: &[(Duration, Frame)], end: Duration) -> Model {
 /// The distance between the vehicle and its predicted position, m.
 fn missed_by_m(predicted: &PredictedPosition, flight: &Model) -> f64 {
     let motion = flight.vehicle.motion.expect("it flies").value;
-    let across_m = libm::hypot(motion.x_m - predicted.x_m, motion.y_m - predicted.y_m);
+    let across_m = libm::hypot(motion.x_m - predicted.spot.north_m, motion.y_m - predicted.spot.east_m);
     libm::hypot(across_m, motion.altitude_m - predicted.altitude_m)
 }
 
@@ -92,10 +92,10 @@ fn the_true_path_stays_inside_the_error_circle_in_19_of_20_cases() {
             for (now, later) in heard.iter().filter(|(now, _)| now > lost_at) {
                 let Some(predicted) = predict_position(&known.vehicle, *now) else { continue };
                 all += 1;
-                inside += u32::from(missed_by_m(&predicted, later) <= predicted.error_m);
+                inside += u32::from(missed_by_m(&predicted, later) <= predicted.spot.error_m);
                 by_plan += u32::from(predicted.basis == Basis::Plan);
                 let height_m = known.vehicle.motion.map_or(0.0, |motion| motion.value.altitude_m);
-                useful += u32::from(predicted.error_m < height_m);
+                useful += u32::from(predicted.spot.error_m < height_m);
             }
         }
     }

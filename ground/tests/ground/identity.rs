@@ -49,15 +49,15 @@ fn the_first_line_of_every_page_is_the_identity() {
 fn a_vehicle_that_contradicts_itself_is_live() {
     let mut rig = Rig::crewed();
     rig.run(2.0);
-    assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
+    assert!(rig.model.vehicle.boot.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
     for simulated in [false, true] {
         rig.simulated = simulated;
         rig.run(2.0);
-        assert!(!rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" LIVE"));
+        assert!(!rig.model.vehicle.boot.is_simulated() && first_line(&rig, 80, 24).starts_with(" LIVE"));
     }
     rig.reboot();
     rig.run(4.0);
-    assert!(rig.model.vehicle.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
+    assert!(rig.model.vehicle.boot.is_simulated() && first_line(&rig, 80, 24).starts_with(" SIM"));
 }
 
 /// The vehicle reboots four seconds after its boot, which its clock alone would not show.

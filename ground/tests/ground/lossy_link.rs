@@ -188,7 +188,7 @@ fn held_after_s(seed: u64, keys: [Key; 2]) -> f64 {
                 pressed_at = Some(now);
                 msgs.extend(keys.map(|key| Msg::Keys(vec![key])));
             }
-            (Some(at), None) if vehicle.phase().on_pad() => return (now - at).as_secs_f64(),
+            (Some(at), None) if vehicle.phase().on_pad() => return now.saturating_sub(at).as_secs_f64(),
             (Some(_), None) => return f64::INFINITY,
             _ => {}
         }

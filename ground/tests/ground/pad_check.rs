@@ -313,7 +313,7 @@ fn a_screen_that_only_watches_checks_nothing() {
     let mut settings = settings(false, true);
     settings.role = Role::Watching;
     let mut rig = Rig::new(settings);
-    rig.model.history_ends();
+    rig.model.alarms.history_ends();
     rig.run(1.0);
     rig.keys(&[typed("X"), vec![Key::Enter], typed("U")].concat());
     assert!(checks(&mut rig).is_empty() && rig.model.range_test.is_none());

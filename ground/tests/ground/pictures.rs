@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use ground::key::Key;
 use ground::model::{Act, Page, Seat};
-use ground::replay::recording::{RecordedEvent, Recording};
+use ground::replay::recording::Recording;
 use ground::update::{Msg, Request};
 use ground::view::theme::{Ink, Level, Palette, TextRole, Theme, true_colour};
 use ground::view::{CUT_MARK, footer};
@@ -22,6 +22,7 @@ use protocol::dialect::{
 };
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier};
+use strum::VariantArray as _;
 
 use crate::rig::svg::{colours, moving_picture, picture, rgb};
 use crate::rig::{MONO, Rig, settings};
@@ -229,7 +230,7 @@ fn every_theme_shows_the_same_text_with_enough_contrast() {
     fs::create_dir_all(&folder).unwrap();
     every_page(|name, rig, size| {
         let plain = rows(&drawn(rig, size, Palette::None));
-        for palette in Palette::ALL {
+        for palette in Palette::VARIANTS.iter().copied() {
             let buffer = drawn(rig, size, palette);
             let theme = Theme { palette, ascii: false };
             assert_eq!(rows(&buffer), plain, "{name} {palette:?}");
@@ -277,7 +278,7 @@ fn inks(theme: Theme) -> Vec<Color> {
     use TextRole::{Caution, Good, Key as OfKeys, Label, Plain, Stale, Title};
     let roles = [Plain, Label, Stale, Title, Good, Caution, OfKeys];
     let styles = roles.map(|role| theme.style(role).fg.expect("a colour"));
-    Ink::ALL.into_iter().map(|ink| theme.ink(ink)).chain(styles).collect()
+    Ink::VARIANTS.iter().map(|ink| theme.ink(*ink)).chain(styles).collect()
 }
 
 /// Every colour can be read on every ground of its theme, on terminals of 256 colours and of 24
@@ -288,7 +289,7 @@ fn every_colour_of_a_theme_can_be_read() {
         let theme = Theme { palette, ascii: false };
         let grounds = [theme.ground(), theme.raised()].map(|style| style.bg.unwrap());
         let on_grounds = inks(theme).into_iter().flat_map(|fore| grounds.map(|back| (fore, back)));
-        let levels = Level::ALL.into_iter().map(|level| theme.level(level));
+        let levels = Level::VARIANTS.iter().map(|level| theme.level(*level));
         let whole = levels.chain([theme.style(TextRole::Alarm)]).map(|s| (s.fg.unwrap(), s.bg.unwrap()));
         for (fore, back) in on_grounds.chain(whole) {
             for shown in [std::convert::identity, true_colour] {
@@ -404,20 +405,19 @@ struct Moment {
 fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/flight.tlog");
     let recording = Recording::load(&path, None).expect("the recorded flight");
-    let mut reader = recording.reader().expect("the recorded flight");
+    let reader = recording.reader().expect("the recorded flight");
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     let status = TD_FLIGHT_STATUS_DATA::default();
     let mut moment = Moment { rig, phase: TdPhase::TD_PHASE_SAFE, status, height_m: f64::INFINITY };
-    while let Some((at, event)) = reader.next_event().expect("the recorded flight") {
+    for event in reader {
+        let (at, event) = event.expect("the recorded flight");
         let rig = &mut moment.rig;
         while rig.now + Duration::from_millis(100) <= at {
             rig.run(0.1);
         }
         match event {
-            RecordedEvent::Commanded(kind) => rig.msg(Msg::Commanded(kind)),
-            RecordedEvent::Sent(_) => {}
-            RecordedEvent::Heard(frame) => {
+            Msg::Frame(frame) => {
                 match frame.decode().expect("a message of the vehicle") {
                     MavMessage::TD_FLIGHT_STATUS(status) => {
                         (moment.phase, moment.status) = (status.phase, status);
@@ -429,6 +429,8 @@ fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
                 }
                 moment.rig.msg(Msg::Frame(frame));
             }
+            command @ Msg::Commanded(_) => rig.msg(command),
+            _ => {}
         }
         if enough(&moment) {
             break;

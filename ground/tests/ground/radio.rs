@@ -82,35 +82,23 @@ fn timesync_is_answered_and_the_round_trip_is_shown() {
 
 fn answers(rig: &mut Rig) -> usize {
     let is_answer = |message: &MavMessage| matches!(message, MavMessage::TIMESYNC(data) if data.tc1 != 0);
-    #[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
-    let is_ping = |message: &MavMessage| matches!(message, MavMessage::PING(_));
     let sent = std::mem::take(&mut rig.actions);
-    let is_ours = |action: &&Action| matches!(action, Action::Send(m) if is_answer(m) || is_ping(m));
+    let is_ours = |action: &&Action| matches!(action, Action::Send(m) if is_answer(m));
     sent.iter().filter(is_ours).count()
 }
 
 #[test]
-#[expect(deprecated, reason = "superseded by TIMESYNC, yet vehicles in use still ask")]
 fn only_questions_to_this_station_are_answered() {
     let mut rig = Rig::crewed();
     let timesync = |target_system, target_component| {
         let data = TIMESYNC_DATA { tc1: 0, ts1: 77, target_system, target_component };
         MavMessage::TIMESYNC(data)
     };
-    let ping = |target_system, target_component| {
-        MavMessage::PING(protocol::dialect::PING_DATA {
-            time_usec: 5,
-            seq: 1,
-            target_system,
-            target_component,
-        })
-    };
-    for asked in [timesync(0, 0), timesync(255, 190), ping(0, 0)] {
+    for asked in [timesync(0, 0), timesync(255, 190)] {
         rig.hear(&asked);
         assert_eq!(answers(&mut rig), 1, "{asked:?}");
     }
-    // A PING with a target is an answer already.
-    for other in [timesync(254, 190), timesync(255, 1), ping(254, 190), ping(255, 1), ping(255, 190)] {
+    for other in [timesync(254, 190), timesync(255, 1)] {
         rig.hear(&other);
         assert_eq!(answers(&mut rig), 0, "{other:?}");
     }

@@ -8,6 +8,7 @@ use ground::view::status_lines;
 use ground::view::theme::{Level, Palette, Theme, true_colour};
 use ground::view::top_lines::level;
 use protocol::dialect::{TdAbortEffect, TdBooster, TdInterlock, TdLatch, TdMotor, TdPhase};
+use strum::VariantArray as _;
 
 use crate::pictures::{CONTRAST_MIN, contrast, flying};
 use crate::rig::svg::colours;
@@ -98,7 +99,7 @@ fn unreadable(rig: &Rig, (columns, rows): (u16, u16), theme: Theme) -> Vec<Strin
 #[test]
 fn the_dangers_have_every_colour_of_a_row() {
     let levels: Vec<Level> = dangers().iter().map(|(_, rig)| level(&rig.model, rig.now)).collect();
-    assert!(Level::ALL.iter().all(|level| levels.contains(level)), "{levels:?}");
+    assert!(Level::VARIANTS.iter().all(|level| levels.contains(level)), "{levels:?}");
 }
 
 #[test]
@@ -108,7 +109,7 @@ fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
         let others = ["calm", "boost", "down"].contains(&danger);
         for kind in CommandKind::ALL.iter().copied().filter(|kind| others || *kind == CommandKind::Abort) {
             in_every_state(&mut rig, kind, |state, rig| {
-                for palette in Palette::ALL {
+                for palette in Palette::VARIANTS.iter().copied() {
                     let theme = Theme { palette, ascii: false };
                     let sizes = if kind == CommandKind::Abort { &SIZES[..] } else { &SIZES[..1] };
                     for size in sizes {
@@ -131,7 +132,7 @@ fn a_begun_and_a_kept_abort_can_be_read_at_every_danger_in_every_theme() {
         let mut begun = dangers().into_iter().find(|(name, _)| *name == danger).unwrap().1;
         begun.key(Key::CtrlX);
         for rig in [kept, begun] {
-            for palette in Palette::ALL {
+            for palette in Palette::VARIANTS.iter().copied() {
                 for size in SIZES {
                     let wrong = unreadable(&rig, size, Theme { palette, ascii: false });
                     assert!(wrong.is_empty(), "{danger} {palette:?} {size:?}: {wrong:?}");

@@ -174,7 +174,7 @@ fn quitting_takes_the_word_while_people_must_keep_away() {
 fn hung() -> Rig {
     let mut rig = Rig::new(Settings { role: Role::Attached, ..settings(false, true) });
     rig.run(2.0);
-    rig.model.history_ends();
+    rig.model.alarms.history_ends();
     rig.run(1.0);
     rig
 }

@@ -95,7 +95,7 @@ fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
         (true, failed, "ANOLOG", Request::WithoutLog),
     ] {
         let mut rig = Rig::new(ground::model::Settings { role: Role::Attached, ..settings(false, true) });
-        rig.model.history_ends();
+        rig.model.alarms.history_ends();
         rig.simulated = simulated;
         rig.run(1.0);
         tell_mission(&mut rig, 0);

@@ -155,7 +155,7 @@ fn the_past_is_not_called_out() {
     rig.run(1.0);
     rig.phase = TdPhase::TD_PHASE_BOOST;
     rig.run(1.0);
-    rig.model.history_ends();
+    rig.model.alarms.history_ends();
     assert!(said(&mut rig).is_empty());
     rig.phase = TdPhase::TD_PHASE_COAST;
     rig.run(1.0);

@@ -129,8 +129,7 @@ fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), the
             continue;
         };
         let (mark, role) = role_of(value.verdict);
-        let (_, unit, factor, decimals) = shown(value);
-        let number = |number: f32| fixed(factor * f64::from(number), decimals);
+        let (_, unit, number) = shown(value);
         let limit = if value.least.is_finite() { value.least } else { value.most };
         let (found, limit) = (number(value.value), number(limit));
         let text = format!("{mark}{found}, {limit} {unit}");
@@ -142,8 +141,7 @@ fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), the
 /// A value with its limits, in a column.
 fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     let (mark, role) = role_of(value.verdict);
-    let (name, unit, factor, decimals) = shown(value);
-    let number = |number: f32| fixed(factor * f64::from(number), decimals);
+    let (name, unit, number) = shown(value);
     let is_switch = unit.is_empty() && value.item != TdPadCheckItem::TD_PAD_CHECK_ITEM_GNSS_FIXES;
     let yes_no = if value.value > 0.5 { "yes" } else { "no" };
     let found = if is_switch { yes_no.to_owned() } else { format!("{} {unit}", number(value.value)) };

@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use protocol::dialect::message_name;
+use protocol::frame::FramerCounters;
 use protocol::identity::Address;
 use protocol::link_stats::{LinkFigures, MessageFigures, SourceFigures};
+use protocol::signing::SigningCounters;
 use ratatui::text::{Line, Span};
 
 use crate::model::{LinkReport, Model, RADIO_FRESH, STALE_AFTER, refusal};
@@ -44,26 +46,15 @@ fn cells([name, rx, tx, frames, loss, copies, age]: [&str; 7]) -> String {
 /// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about
 /// itself.
 fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let (link, framing) = (&model.link, &model.link.framing);
+    let FramerCounters { crc_errors, unknown_ids, cut_short, unknown_flags, garbage_bytes, .. } =
+        model.link.framing;
+    let fields = model.link.undecodable;
     let unreadable = format!(
-        "checksum {}  id {}  cut {}  flags {}  fields {}  garbage {} B",
-        framing.crc_errors,
-        framing.unknown_ids,
-        framing.cut_short,
-        framing.unknown_flags,
-        model.link.undecodable,
-        framing.garbage_bytes
+        "checksum {crc_errors}  id {unknown_ids}  cut {cut_short}  flags {unknown_flags}  fields {fields}  garbage {garbage_bytes} B"
     );
     let signed = model.link.signing.map(|signing| {
-        format!(
-            "good {}  unsigned {}  wrong {}  replayed {}  old {}  new {}",
-            signing.accepted,
-            signing.unsigned,
-            signing.wrong,
-            signing.replayed,
-            signing.too_old,
-            signing.too_new
-        )
+        let SigningCounters { accepted, unsigned, wrong, replayed, too_old, too_new } = signing;
+        format!("good {accepted}  unsigned {unsigned}  wrong {wrong}  replayed {replayed}  old {too_old}  new {too_new}")
     });
     let drops = model.link.send_drops;
     let refused = model.link.uplink.refused.map(|refused| {
@@ -83,7 +74,10 @@ fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         ("unsent", (drops > 0).then(|| format!("{drops} writes found no room"))),
         ("refused", refused),
         ("radio", radio),
-        ("answers", link.round_trip.map(|trip| format!("round trip {:.0} ms", 1e3 * trip.as_secs_f64()))),
+        (
+            "answers",
+            model.link.round_trip.map(|trip| format!("round trip {:.0} ms", 1e3 * trip.as_secs_f64())),
+        ),
     ];
     let known = rows.into_iter().filter_map(|(label, value)| Some((label, value?)));
     known

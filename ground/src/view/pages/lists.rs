@@ -23,9 +23,7 @@ pub fn alarms_lines(
     if list.is_empty() {
         return vec![theme.line(" no active or unacknowledged alarm", TextRole::Plain)];
     }
-    let chosen = model
-        .pointed_at()
-        .and_then(|chosen| list.iter().position(|alarm| alarm.what.kind == chosen.what.kind));
+    let chosen = model.pointed_at();
     let head = Line::from(vec![
         theme.key(" Space"),
         theme.label(" acknowledges the marked one; "),

@@ -174,7 +174,7 @@ fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let burns = model.vehicle.mission()?.motor_burns;
     let (word, found) = match burns {
         0 if why_untested(model).is_some() => (" NO ", "UNCONFIRMED: no burn of its lot".to_owned()),
-        0 if model.vehicle.is_simulated() => ("    ", "certified, no burn of its lot".to_owned()),
+        0 if model.vehicle.boot.is_simulated() => ("    ", "certified, no burn of its lot".to_owned()),
         0 => (" !! ", "overruled: UNCONFIRMED, no burn of its lot".to_owned()),
         _ => ("    ", format!("confirmed, burns of its lot: {burns}")),
     };
@@ -290,7 +290,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let on_pad = phase.is_some_and(is_on_pad);
     let checked =
         on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
-    let pin_out = vehicle.interlocks().is_some_and(|locks| locks.contains(TdInterlock::TD_INTERLOCK_PIN_OUT));
+    let pin_out = vehicle.shows(TdInterlock::TD_INTERLOCK_PIN_OUT);
     let counting = vehicle.countdown_s().is_some();
     let two = model.people() == Some(2);
     let then = |act: Act, word: &str| {

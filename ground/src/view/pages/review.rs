@@ -24,12 +24,12 @@ const FINDINGS_TITLE: &str = "what went wrong";
 pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let ended = panels::ending_role(model, now).map(|(ending, role)| (ending.sentence(&model.vehicle), role));
     let settles = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_TOUCHDOWN);
-    let (words, role) = ended.unwrap_or_else(|| match settles {
-        true => {
-            ("at the ground; the vehicle judges its landing once it is at rest".to_owned(), TextRole::Plain)
-        }
-        false => ("no verdict received yet".to_owned(), TextRole::Caution),
-    });
+    let none = if settles {
+        ("at the ground; the vehicle judges its landing once it is at rest".to_owned(), TextRole::Plain)
+    } else {
+        ("no verdict received yet".to_owned(), TextRole::Caution)
+    };
+    let (words, role) = ended.unwrap_or(none);
     let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let report = Act::Report.works(model, now);
     let report = report.then(|| theme.label(format!("  {} writes the report", Act::Report.key_name())));
@@ -76,15 +76,13 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
 /// What the vehicle says went wrong, each with its T+.
 fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let findings = &model.vehicle.findings;
-    let Some(count) = findings.count else {
-        return vec![theme.line(" not told yet", TextRole::Label)];
+    let label = |words| vec![theme.line(words, TextRole::Label)];
+    let count = match findings.count {
+        None => return label(" not told yet"),
+        Some(0) if model.vehicle.verdict().is_none() => return label(" none reported so far"),
+        Some(0) => return label(" nothing went wrong"),
+        Some(count) => count,
     };
-    if count == 0 && model.vehicle.verdict().is_none() {
-        return vec![theme.line(" none reported so far", TextRole::Label)];
-    }
-    if count == 0 {
-        return vec![theme.line(" nothing went wrong", TextRole::Label)];
-    }
     let arrived = findings.in_time();
     let missing = usize::from(count).saturating_sub(arrived.len());
     let room = columns.saturating_sub(FINDING_TIME_COLUMNS).max(8);

@@ -174,12 +174,12 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     }
 }
 
-/// Least specific force of a motor, m/s2: a vehicle that falls freely or is braked by the air in the
-/// last metres has less.
+/// Least specific force of a motor, m/s2: a vehicle that falls freely or is braked by the air in
+/// the last metres has less.
 const THRUST_MIN_M_S2: f64 = 4.0;
 
-/// Whether a motor gives thrust, by what the vehicle has measured: the phases after an ignition that
-/// was only commanded, and the acceleration as soon as it is known.
+/// Whether a motor gives thrust, by what the vehicle has measured: the phases after an ignition
+/// that was only commanded, and the acceleration as soon as it is known.
 fn gives_thrust(vehicle: &Vehicle) -> bool {
     let phase = match vehicle.phase_now() {
         Some(TdPhase::TD_PHASE_BOOST) => vehicle.has_lifted,

@@ -23,13 +23,6 @@ const TOP_MIN_M: f64 = 10.0;
 const TICK_ROWS: u16 = 3;
 const TICK_COLUMNS: u16 = 7;
 
-/// The heights flown until now, with their time since the lift-off.
-fn flown(model: &Model, from: Duration, now: Duration) -> Vec<(f64, f64)> {
-    let Some(height) = Quantity::named("height") else { return Vec::new() };
-    let values = model.history.trace.values(height, from, now);
-    values.map(|(at, height_m)| (seconds_since(at, from), height_m)).collect()
-}
-
 /// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will
 /// be lit, and the height below which no parachute opens.
 pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
@@ -39,7 +32,6 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let vehicle = &model.vehicle;
     let from = flight_began(model).unwrap_or(now);
     let until = shown_until(model, now);
-    let flown = flown(model, from, until);
     let present_s = seconds_since(until, from);
     let foreseen = foreseen(vehicle, now).into_iter();
     let to_come: Vec<(f64, f64)> = foreseen.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
@@ -60,7 +52,9 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let begins_s =
         lit_s.filter(|_| burns).map_or(if burns { present_s } else { 0.0 }, |lit_s| lit_s.min(present_s));
     let begins_s = if burns { (begins_s - 1.0).floor().max(0.0) } else { 0.0 };
-    let flown: Vec<(f64, f64)> = flown.into_iter().filter(|(at, _)| *at >= begins_s).collect();
+    let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
+    let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
+    let flown: Vec<(f64, f64)> = flown.filter(|(at, _)| *at >= begins_s).collect();
     let reached = flown.iter().chain(&to_come).map(|(_, height_m)| *height_m).fold(TOP_MIN_M, f64::max);
     let top =
         [apogee_m, commit_m, band.map(|band| band.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;

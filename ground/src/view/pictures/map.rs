@@ -69,7 +69,7 @@ fn impact_without_motor(model: &Model, now: Duration) -> Option<(f64, f64)> {
     let height_m = vehicle.height_m()?.value;
     let falls_s = height_m / -motion.climb_m_s;
     (motion.climb_m_s < -FALL_MIN_M_S)
-        .then(|| (motion.y_m + motion.vy_m_s * falls_s, motion.x_m + motion.vx_m_s * falls_s))
+        .then_some((motion.y_m + motion.vy_m_s * falls_s, motion.x_m + motion.vx_m_s * falls_s))
 }
 
 /// The middle of the picture and how far it reaches, m: both in steps, so that the ground stands
@@ -101,10 +101,9 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         return;
     }
     let vehicle = &model.vehicle;
-    let flown: Vec<(f64, f64)> =
-        vehicle.flown.points().iter().map(|[north, east, _]| (*east, *north)).collect();
+    let flown: Vec<(f64, f64)> = vehicle.flown.iter().map(|[north, east, _]| (*east, *north)).collect();
     let down = comes_down(model, now);
-    let lost = predict_position(vehicle, now);
+    let lost = predict_position(vehicle, now).map(|at| at.spot);
     let impact = impact_without_motor(model, now).filter(|_| down.is_some());
     let fence_m = vehicle.fence_m();
     let phase = vehicle.phase_now();
@@ -119,7 +118,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let crew = vehicle.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
     let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
     let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
-    points.extend(lost.iter().flat_map(|at| around((at.y_m, at.x_m), at.error_m.min(500.0))));
+    points.extend(lost.iter().flat_map(|at| around((at.east_m, at.north_m), at.error_m.min(500.0))));
     points.extend(down.iter().map(|at| (at.east_m, at.north_m)).chain(impact));
     if !burns || points.is_empty() {
         points.push((0.0, 0.0));
@@ -148,7 +147,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             attitude.axes[0].map(|part| 0.4 * reach_m * part / libm::sin(attitude.tilt_rad));
         ((east, north), attitude.tilt_rad.to_degrees())
     });
-    let error = lost.map(|at| circle((at.y_m, at.x_m), at.error_m));
+    let error = lost.map(|at| circle((at.east_m, at.north_m), at.error_m));
     plane.draw(theme, frame, |context| {
         if let Some(fence_m) = fence_m {
             let (x, y, color) = (0.0, 0.0, theme.ink(Ink::Limit));
@@ -177,8 +176,8 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         plane.write(frame, (at.east_m, at.north_m), "×", ink(Ink::Predicted));
     }
     if let Some(at) = lost {
-        plane.write(frame, (at.y_m, at.x_m), "+", ink(Ink::Predicted));
-        plane.beside(frame, (at.y_m, at.x_m), &["PREDICTED".to_owned()], ink(Ink::Predicted));
+        plane.write(frame, (at.east_m, at.north_m), "+", ink(Ink::Predicted));
+        plane.beside(frame, (at.east_m, at.north_m), &["PREDICTED".to_owned()], ink(Ink::Predicted));
     } else if let Some(at) = here {
         plane.write(frame, at, "●", strong);
     }
