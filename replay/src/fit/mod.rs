@@ -48,7 +48,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, print_error, print_note, text_of, warn_of_loss};
+use crate::cli::{Answer, ending, give, print_error, print_note, text_of, warn_of_loss};
 use crate::info::utc;
 use crate::log::Recording;
 use crate::output::NewFile;
@@ -279,11 +279,9 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
             }
         }
         Err(reason) => {
-            for name in
-                ["drag_per_mass_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
-            {
-                fit.lacks(name, &reason);
-            }
+            ["drag_per_mass_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
+                .iter()
+                .for_each(|name| fit.lacks(name, &reason));
         }
     }
     fit.lacks("mass", "the accelerometer cannot tell a lighter vehicle from more thrust and drag: weigh it");
@@ -325,10 +323,9 @@ fn drag(fit: &mut Fit, along: &Along) {
 fn motor(fit: &mut Fit, along: &Along) {
     let Along { solution, .. } = along;
     if let Err(reason) = &along.burn_seen_s {
-        for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
-        {
-            fit.lacks(name, reason);
-        }
+        ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
+            .iter()
+            .for_each(|name| fit.lacks(name, reason));
         return;
     }
     let mut with_scale = solution.clone();
@@ -686,11 +683,6 @@ fn once_each(fits: &mut Vec<Fit>) {
         known.insert(content.clone(), fit.source.clone());
         true
     });
-}
-
-/// What a file's name ends in: json, csv, or anything else for a log.
-fn ending(file: &Path) -> String {
-    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 fn curve_of(motor: &str) -> Result<ThrustCurve> {

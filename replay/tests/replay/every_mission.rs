@@ -115,7 +115,7 @@ const TABLE: [Row; 16] = [
         (0, &["ABORTED", "{mission}", "abort of the crew", "!NaN"]),
         (0, &["REFUSED: controller warm", "{mission}", "!NaN"]),
     ),
-    row("export {log} --to csv --out {dir}/csv", TABLES, TABLES, TABLES),
+    row("export {log} --out {dir}/csv", TABLES, TABLES, TABLES),
     row(
         "info {dir}/station.mcap",
         (0, &["verdict     STANDS UNDAMAGED"]),
