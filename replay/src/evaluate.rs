@@ -204,10 +204,8 @@ impl Answer for EvaluateReport {
             let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
             lines.push(format!("no command differs: {settings} {what} in this flight"));
         }
-        if differing.is_empty() {
-            return lines;
-        }
-        lines.push(format!("{} frames differ; --json has every frame", differing.len()));
+        let differ = || format!("{} frames differ; --json has every frame", differing.len());
+        lines.extend((!differing.is_empty()).then(differ));
         lines
     }
 }

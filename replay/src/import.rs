@@ -182,7 +182,7 @@ type Column = (&'static [&'static str], fn(&mut Telemetry, f64));
 const COLUMNS: [Column; 8] = [
     (&["time", "time (s)"], |sample, value| sample.time_s = value),
     (&["height", "altitude agl (m)", "altitude (m)", "z (m)"], |sample, value| {
-        sample.altitude_m = Some(value)
+        sample.altitude_m = Some(value);
     }),
     (&["x (m)", "position east of launch (m)"], |sample, value| sample.east_m = Some(value)),
     (&["y (m)", "position north of launch (m)"], |sample, value| sample.north_m = Some(value)),

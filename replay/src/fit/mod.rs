@@ -279,9 +279,11 @@ pub fn uncalibrated(trace: &Trace) -> Fit {
             }
         }
         Err(reason) => {
-            ["drag_per_mass_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
-                .iter()
-                .for_each(|name| fit.lacks(name, &reason));
+            for name in
+                ["drag_per_mass_scale", "thrust_scale", "burn_time_scale", "ignition_delay", "gimbal", "wind"]
+            {
+                fit.lacks(name, &reason);
+            }
         }
     }
     fit.lacks("mass", "the accelerometer cannot tell a lighter vehicle from more thrust and drag: weigh it");
@@ -323,9 +325,10 @@ fn drag(fit: &mut Fit, along: &Along) {
 fn motor(fit: &mut Fit, along: &Along) {
     let Along { solution, .. } = along;
     if let Err(reason) = &along.burn_seen_s {
-        ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
-            .iter()
-            .for_each(|name| fit.lacks(name, reason));
+        for name in ["thrust_scale", "burn_time_scale", "ignition_delay", "thrust_shape", "exhaust_body_loss"]
+        {
+            fit.lacks(name, reason);
+        }
         return;
     }
     let mut with_scale = solution.clone();

@@ -154,6 +154,9 @@ struct Rest {
     rough: f64,
 }
 
+/// The process with another number.
+type WithNumber = fn(Rest, f64) -> Rest;
+
 impl Rest {
     fn whitener(&self, samples: &[Sample], white: f64) -> Whitener {
         let kept = libm::exp(-FRAME_S / self.lasts_s);
@@ -181,7 +184,7 @@ impl Rest {
             let whitener = rest.whitener(samples, white);
             missed.iter().map(|axis| whitener.surprise(axis)).sum::<f64>()
         };
-        let numbers: [(f64, f64, fn(Self, f64) -> Self); 3] = [
+        let numbers: [(f64, f64, WithNumber); 3] = [
             (0.01, 30.0, |rest, sigma_rad_s2| Self { sigma_rad_s2, ..rest }),
             (0.02, 5.0, |rest, lasts_s| Self { lasts_s, ..rest }),
             (1e-4, 1.0, |rest, rough| Self { rough, ..rest }),

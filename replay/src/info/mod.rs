@@ -624,9 +624,6 @@ pub(crate) fn utc(unix_ns: u64) -> String {
         .unwrap_or_else(|| format!("{unix_ns} ns"))
 }
 
-/// Stands for standard input.
-const STDIN: &str = "-";
-
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The logs, MCAP files; - is standard input. Of a folder every log is a line of a table.
@@ -670,7 +667,7 @@ impl Args {
 }
 
 fn description(file: &std::path::Path) -> Result<Info, LogError> {
-    if file.as_os_str() == STDIN {
+    if file.as_os_str() == "-" {
         return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?);
     }
     // A pipe of the shell, as in `info <(...)`, is open already, and its writer is there.

@@ -139,7 +139,7 @@ impl<'a> Rescue<'a> {
         self.recovered.put_in_order = words;
         let (mut last_ns, mut before_ns) = (0, None);
         for Held { header, data, .. } in order {
-            let mut header = header.clone();
+            let mut header = *header;
             if words.is_some() {
                 // Records of one time stay so.
                 let same = before_ns.replace(header.log_time) == Some(header.log_time);
