@@ -92,7 +92,7 @@ const SAID: [(&str, &str); 20] = [
     ("replay recover cut.mcap", "whole.mcap"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
     ("replay compare flight.mcap without.mcap", "without.mcap"),
-    ("replay export flight.mcap --to csv", "tables"),
+    ("replay export flight.mcap", "tables"),
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay compare logs again", "shows no difference"),

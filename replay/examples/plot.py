@@ -1,4 +1,4 @@
-"""Plots a flight: replay export flight.mcap --to csv --out tables; python3 plot.py tables plot.png"""
+"""Plots a flight: replay export flight.mcap --out tables; python3 plot.py tables plot.png"""
 import sys
 import matplotlib
 import pandas

@@ -13,7 +13,7 @@ use protocol::text::printable;
 use serde::Serialize;
 
 use crate::log::{Cut, Gap, Recording};
-use crate::print::print_json;
+use crate::settings::Setting;
 
 /// The worse of two answers: a no, then what could not be answered.
 pub(crate) fn worse(one: Exit, other: Exit) -> Exit {
@@ -52,7 +52,8 @@ impl<One: Answer> Answer for Vec<One> {
 pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Exit> {
     answer(|output| {
         if json {
-            return print_json(found, output);
+            serde_json::to_writer_pretty(&mut *output, found)?;
+            return writeln!(output);
         }
         let lines = found.sentences();
         lines.iter().try_for_each(|line| writeln!(output, "{}", printable(line.as_bytes())))
@@ -83,6 +84,11 @@ pub(crate) fn give_each<A: Answer>(
         _ => give(&all, json)?,
     };
     Ok(worse(given, outcome))
+}
+
+/// What a file's name ends in, in lower case.
+pub(crate) fn ending(file: &Path) -> String {
+    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 /// The logs of a directory, in subdirectories, too. Each regular file counts once, however many
@@ -143,8 +149,51 @@ pub fn print_error(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
 }
 
-/// Warns about damage, a missing end of the flight and missing frames.
-pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
+/// The file of a command that writes a log from it, and the log.
+#[derive(Debug, clap::Args)]
+pub(crate) struct FromTo {
+    /// The file to read.
+    file: PathBuf,
+    /// The log to write.
+    output: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl FromTo {
+    pub(crate) fn run<A: Answer, E>(self, write: fn(&Path, &Path) -> Result<A, E>) -> Result<Exit>
+    where
+        anyhow::Error: From<E>,
+    {
+        give(&write(&self.file, &self.output)?, self.json)
+    }
+}
+
+/// A recorded flight, and other settings for it.
+#[derive(Debug, clap::Args)]
+pub(crate) struct WithSettings {
+    /// The log, an MCAP file.
+    file: PathBuf,
+    /// Another setting, PATH=VALUE or PATH=VALUE@S.
+    ///
+    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
+    #[arg(long = "set", value_name = "SETTING")]
+    pub(crate) settings: Vec<Setting>,
+    /// Answer in JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+impl WithSettings {
+    pub(crate) fn recording(&self) -> Result<Recording> {
+        recording(&self.file)
+    }
+}
+
+/// A recorded flight, with warnings about damage, a missing end and missing frames.
+pub(crate) fn recording(file: &Path) -> Result<Recording> {
+    let recording = Recording::open(file)?;
     if let Some(Gap { after, before }) = recording.gap() {
         let name = &recording.name;
         print_note(&format!(
@@ -152,6 +201,7 @@ pub(crate) fn warn_of_what_is_missing(recording: &Recording) {
         ));
     }
     warn_of_loss(&recording.name, recording.damage.as_deref(), recording.cut.as_ref());
+    Ok(recording)
 }
 
 /// Warns of a log that is damaged, and of a flight that was not recorded to its end.

@@ -3,20 +3,19 @@
 use std::collections::BTreeMap;
 
 pub use avionics::log::again::FrameError;
-use avionics::log::again::{RecordedComputer, mission_flown};
-use avionics::log::frame::{LoggedInput, level_of, phase_of, start_to_log};
+use avionics::log::again::RecordedComputer;
+use avionics::log::frame::{level_of, phase_of};
+use flight::computer::Computer;
 use flight::computer::pilot::Pilot;
-use flight::computer::{Computer, Output};
 use flight::guidance::powered::{ControlLevel, Plan};
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::Mission;
 use ocp::Status;
 use protocol::log::computer_v1::{ComputerFrame, ComputerOutput, ComputerStart};
 use serde::Serialize;
 use sim::sortie::SetUpError;
 
 use crate::log::RecordingError;
-use crate::settings::{Schedule, Setting, SettingError, mission_with};
+use crate::settings::{Schedule, Setting, SettingError};
 
 /// Why the frames of a log cannot be executed again, or its flight be flown again.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +37,17 @@ pub enum AgainError {
     /// The request cannot be met: `of` is the file or the setting.
     #[error("{of}: {reason}")]
     Refused { of: String, reason: String },
+}
+
+/// Refuses the first setting for which `why_not` has a reason.
+pub(crate) fn refuse(
+    settings: &[Setting],
+    why_not: impl Fn(&Setting) -> Option<String>,
+) -> Result<(), AgainError> {
+    match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
+        None => Ok(()),
+        Some((setting, reason)) => Err(AgainError::Refused { of: setting.to_string(), reason }),
+    }
 }
 
 /// Summary of a frame's decision.
@@ -71,17 +81,10 @@ pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 #[derive(Debug, Clone)]
 pub struct LoggedComputer {
     computer: RecordedComputer,
-    schedule: Schedule<Mission>,
-    /// If false, the recorded digests are copied.
-    compares_digests: bool,
-}
-
-/// The settings that, according to a log, were changed in its flight.
-///
-/// # Errors
-/// A line is not a setting.
-pub fn settings_in_flight(run: &BTreeMap<String, String>) -> Result<Vec<Setting>, SettingError> {
-    run.get(SETTINGS_IN_FLIGHT).map_or_else(|| Ok(Vec::new()), |text| text.lines().map(str::parse).collect())
+    schedule: Schedule,
+    /// If false, the recorded digests are copied: a computer that did not wait on the pad remembers
+    /// less.
+    pub(crate) compares_digests: bool,
 }
 
 impl LoggedComputer {
@@ -97,30 +100,11 @@ impl LoggedComputer {
         run: &BTreeMap<String, String>,
         other: &[Setting],
     ) -> Result<Self, SettingError> {
-        let settings: Vec<Setting> =
-            settings_in_flight(run)?.into_iter().chain(other.iter().cloned()).collect();
-        let schedule = Self::schedule(mission_toml, start, &settings)?;
-        let computer = RecordedComputer::started(schedule.base(), start);
+        let in_flight = run.get(SETTINGS_IN_FLIGHT).map_or("", String::as_str).lines();
+        let in_flight: Vec<Setting> = in_flight.map(str::parse).collect::<Result<_, _>>()?;
+        let schedule = Schedule::of(mission_toml, start, &[in_flight.as_slice(), other].concat())?;
+        let computer = RecordedComputer::started(&schedule.base, start);
         Ok(Self { computer, schedule, compares_digests: true })
-    }
-
-    /// The same computer where digests are not compared: one that did not wait on the pad remembers
-    /// less.
-    #[must_use]
-    pub fn without_digests(self) -> Self {
-        Self { compares_digests: false, ..self }
-    }
-
-    /// The missions over time: first the mission as at the release, then with the settings.
-    pub(crate) fn schedule(
-        mission_toml: &str,
-        start: &ComputerStart,
-        settings: &[Setting],
-    ) -> Result<Schedule<Mission>, SettingError> {
-        Schedule::of(settings, |so_far| {
-            let set = |path: &str| so_far.iter().any(|setting| setting.path == path);
-            Ok(mission_flown(mission_with(mission_toml, so_far)?, start, set))
-        })
     }
 
     pub(crate) fn computer(&self) -> &Computer {
@@ -132,47 +116,31 @@ impl LoggedComputer {
         self.computer.computer().pilot()
     }
 
-    /// The computer as it is now, as a record.
-    pub(crate) fn as_start(&self) -> ComputerStart {
-        start_to_log(self.computer.computer())
-    }
-
-    /// Runs a recorded frame again: the result has the recorded input and the new decision.
+    /// Runs a recorded frame again, with the restarts and the changes of settings that come before
+    /// it: the result has the recorded input and the new decision.
     ///
     /// # Errors
     /// The recorded input cannot be given to this build's flight computer, or the frame is out of
     /// order.
     pub fn run_again(&mut self, frame: &ComputerFrame) -> Result<ComputerFrame, FrameError> {
-        let read = self.read(frame)?;
-        let output = self.computer.step(&read);
-        Ok(self.record(frame, &read, &output))
-    }
-
-    fn record(&mut self, frame: &ComputerFrame, read: &LoggedInput, output: &Output) -> ComputerFrame {
-        let again = self.computer.record(read, output);
-        if self.compares_digests {
-            again
-        } else {
-            ComputerFrame { state_digest: frame.state_digest, ..again }
-        }
-    }
-
-    /// Reads an input, and applies the restarts and the changes of settings that come before its
-    /// frame.
-    fn read(&mut self, frame: &ComputerFrame) -> Result<LoggedInput, FrameError> {
         let (number, next) = (frame.input.frame, self.computer.next());
-        let flew = self.computer.computer().released_at_s().is_some();
+        let flew = self.computer().released_at_s().is_some();
         let read = self.computer.read(&frame.input)?;
-        let released_at_s = self.computer.computer().released_at_s();
+        let released_at_s = self.computer().released_at_s();
         if let Some(next) = next.filter(|_| flew && released_at_s.is_none()) {
             return Err(FrameError::Gap { frame: number, missing: number.saturating_sub(next) });
         }
         if let Some(released_at_s) = released_at_s
             && let Some(mission) = self.schedule.due(frame.input.time_s - released_at_s)
         {
-            self.computer.computer_mut().reconfigure(mission);
+            self.computer.computer_mut().reconfigure(&mission);
         }
-        Ok(read)
+        let output = self.computer.step(&read);
+        let mut again = self.computer.record(&read, &output);
+        if !self.compares_digests {
+            again.state_digest = frame.state_digest;
+        }
+        Ok(again)
     }
 
     /// A summary of a frame's decision; the computer has just run that frame.

@@ -6,15 +6,13 @@
 //! flight computer that lights its motor earlier than in flight measures no thrust until the
 //! recorded ignition.
 
-use std::path::PathBuf;
-
 use anyhow::Result;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give, warn_of_what_is_missing};
+use crate::cli::{Answer, WithSettings, give};
 pub use crate::controller::Decided;
-use crate::controller::{AgainError, LoggedComputer, phase_name};
+use crate::controller::{AgainError, LoggedComputer, phase_name, refuse};
 use crate::log::Recording;
 use crate::settings::Setting;
 
@@ -75,16 +73,6 @@ pub struct EvaluateReport {
     pub frames: Vec<EvaluatedFrame>,
 }
 
-impl EvaluateReport {
-    /// Whether a frame has another command than recorded: to the gimbal, to the fins, or by its
-    /// phase to igniter or parachute.
-    fn a_command_differs(&self) -> bool {
-        self.frames.iter().any(|EvaluatedFrame { recorded: a, evaluated: b, .. }| {
-            (&a.gimbal_rad, &a.fins_rad, a.phase) != (&b.gimbal_rad, &b.fins_rad, b.phase)
-        })
-    }
-}
-
 /// Evaluates a recorded flight under other settings: two flight computers run on every frame. The
 /// recorded decision comes from the record; what the record leaves out (cost and iterations of a
 /// plan) comes from `then`, which runs with the recorded settings.
@@ -97,7 +85,7 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     let run = &recording.head.run;
     let mut then = LoggedComputer::recorded(toml, start, run, &[])?;
     let last_s = recorded.last().map_or(0.0, |frame| frame.input.time_s);
-    refuse(settings, &recording.name, then.pilot().mission().estimator.frame_s, last_s)?;
+    refuse_unusable(settings, &recording.name, then.pilot().mission().estimator.frame_s, last_s)?;
     let mut now = LoggedComputer::recorded(toml, start, run, settings)?;
     let mut frames = Vec::with_capacity(recorded.len());
     let mut unchanged_different = 0;
@@ -114,13 +102,31 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
             evaluated: now.decided(&again),
         });
     }
-    Ok(summarise(recording, settings, frames, unchanged_different))
+    let apart = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
+    let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
+        frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
+    };
+    let bits = |decided: &Decided| decided.gimbal_rad.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+    let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
+    Ok(EvaluateReport {
+        kind: "open loop: the controller alone on recorded inputs",
+        file: recording.name.clone(),
+        settings: settings.iter().map(ToString::to_string).collect(),
+        unchanged_different,
+        commands_different: count(&|recorded, evaluated| bits(recorded) != bits(evaluated)),
+        gimbal_difference_max_rad: frames.iter().map(apart).fold(0.0, f64::max),
+        fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
+        levels_different: count(&|recorded, evaluated| recorded.level != evaluated.level),
+        phases: phases(&frames),
+        frames_compared: frames.len(),
+        frames,
+    })
 }
 
 /// Refuses settings that the flight computer does not have, or that cannot change on recorded
 /// inputs.
-fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), AgainError> {
-    let why_not = |Setting { path, at_s, .. }: &Setting| {
+fn refuse_unusable(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Result<(), AgainError> {
+    refuse(settings, |Setting { path, at_s, .. }| {
         let why = if NOT_THE_PILOTS.iter().any(|section| path.starts_with(section)) {
             "not a setting of the controller: on recorded inputs it changes nothing; use refly to fly with it"
                 .to_owned()
@@ -134,43 +140,12 @@ fn refuse(settings: &[Setting], name: &str, recorded_s: f64, last_s: f64) -> Res
             return None;
         };
         Some(why)
-    };
-    match settings.iter().find_map(|setting| Some((setting, why_not(setting)?))) {
-        None => Ok(()),
-        Some((setting, why)) => Err(AgainError::Refused { of: setting.to_string(), reason: why }),
-    }
+    })
 }
 
 /// The largest difference of two commands' angles, rad.
 fn apart_rad(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-fn summarise(
-    recording: &Recording,
-    settings: &[Setting],
-    frames: Vec<EvaluatedFrame>,
-    unchanged_different: usize,
-) -> EvaluateReport {
-    let apart = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.gimbal_rad, &frame.evaluated.gimbal_rad);
-    let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
-        frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
-    };
-    let bits = |decided: &Decided| decided.gimbal_rad.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
-    let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
-    EvaluateReport {
-        kind: "open loop: the controller alone on recorded inputs",
-        file: recording.name.clone(),
-        settings: settings.iter().map(ToString::to_string).collect(),
-        unchanged_different,
-        commands_different: count(&|recorded, evaluated| bits(recorded) != bits(evaluated)),
-        gimbal_difference_max_rad: frames.iter().map(apart).fold(0.0, f64::max),
-        fins_difference_max_rad: frames.iter().map(fins_rad).fold(0.0, f64::max),
-        levels_different: count(&|recorded, evaluated| recorded.level != evaluated.level),
-        phases: phases(&frames),
-        frames_compared: frames.len(),
-        frames,
-    }
 }
 
 /// Every phase in the order it was first entered.
@@ -221,37 +196,20 @@ impl Answer for EvaluateReport {
         }));
         let differing: Vec<&EvaluatedFrame> =
             self.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
-        if !settings.is_empty() && !self.a_command_differs() {
+        // To the gimbal, to the fins, or by its phase to igniter or parachute.
+        let commands =
+            |decided: &Decided| (decided.gimbal_rad.clone(), decided.fins_rad.clone(), decided.phase);
+        let acts = differing.iter().any(|frame| commands(&frame.recorded) != commands(&frame.evaluated));
+        if !settings.is_empty() && !acts {
             let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
             lines.push(format!("no command differs: {settings} {what} in this flight"));
         }
-        if differing.is_empty() {
-            return lines;
-        }
-        lines.push(format!("{} frames differ; --json has every frame", differing.len()));
+        let differ = || format!("{} frames differ; --json has every frame", differing.len());
+        lines.extend((!differing.is_empty()).then(differ));
         lines
     }
 }
 
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    /// The log, an MCAP file.
-    file: PathBuf,
-    /// Another setting, PATH=VALUE or PATH=VALUE@S.
-    ///
-    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
-    #[arg(long = "set", value_name = "SETTING")]
-    settings: Vec<Setting>,
-    /// Answer in JSON, with every frame.
-    #[arg(long)]
-    json: bool,
-}
-
-impl Args {
-    pub(crate) fn run(self) -> Result<Exit> {
-        let recording = Recording::open(&self.file)?;
-        warn_of_what_is_missing(&recording);
-        let report = evaluate(&recording, &self.settings)?;
-        give(&report, self.json)
-    }
+pub(crate) fn run(given: &WithSettings) -> Result<Exit> {
+    give(&evaluate(&given.recording()?, &given.settings)?, given.json)
 }

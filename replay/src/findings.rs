@@ -35,18 +35,6 @@ impl Finding {
     }
 }
 
-/// Findings of a recorded flight, causes first.
-///
-/// # Errors
-/// The reason why no findings were computed.
-pub(crate) fn of(
-    recording: &Recording,
-    verdict: Option<&Verdict>,
-    see: impl FnMut(&LoggedComputer, &ComputerFrame, &ComputerFrame),
-) -> Result<Vec<Finding>, String> {
-    facts(recording, verdict, run_again(recording, see).and_then(|(_, findings)| findings))
-}
-
 /// What the vehicle itself reported before its release, each once; all it reported if it was never
 /// released.
 fn on_the_pad(recording: &Recording) -> Vec<Finding> {
@@ -111,7 +99,6 @@ pub(crate) fn run_again(
 /// `findings` has none, and the vehicle was not released, either.
 pub(crate) fn facts(
     recording: &Recording,
-    verdict: Option<&Verdict>,
     findings: Result<Findings, String>,
 ) -> Result<Vec<Finding>, String> {
     let findings = match findings {
@@ -137,6 +124,7 @@ pub(crate) fn facts(
             picture: picture(finding.sign),
         }
     }));
+    let verdict = recording.verdict.as_ref();
     if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings, facts.is_empty())) {
         let since_s = recording.contact_s().unwrap_or(f64::NAN);
         let (clock, follows) = (Clock::Flight, !facts.is_empty());

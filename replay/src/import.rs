@@ -6,7 +6,6 @@
 //! it can be run again. The nose is the body's x axis.
 
 use std::fs::File;
-use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, bail, ensure};
@@ -15,32 +14,14 @@ use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
 use protocol::log::record::Record;
 use protocol::log::v1::Telemetry;
-use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::log::writer::LogHeader;
 use protocol::motion::Degrees;
-use protocol::program::Exit;
 use px4_ulog::full_parser::{MultiId, SomeVec, read_file};
 use serde::Serialize;
 use sim::wire::record::text_event;
 
-use crate::cli::{Answer, give, print_note};
-use crate::output::NewFile;
-
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    /// The flight: .ulg, .bin or .csv.
-    file: PathBuf,
-    /// The log to write.
-    output: PathBuf,
-    /// Answer in JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-impl Args {
-    pub(crate) fn run(self) -> Result<Exit> {
-        give(&import(&self.file, &self.output)?, self.json)
-    }
-}
+use crate::cli::{Answer, ending, print_note};
+use crate::refly::write_records;
 
 /// A log that was written.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -81,11 +62,10 @@ struct Track {
 /// The file cannot be read, is of no known format or has no position, or the log cannot be written.
 pub fn import(file: &Path, output: &Path) -> Result<Imported> {
     let name = file.display();
-    let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
-    let (format, track) = match ending.as_ref().and_then(|ending| ending.to_str()) {
-        Some("ulg") => ("PX4", px4(file)),
-        Some("bin") => ("ArduPilot", ardupilot(file)),
-        Some("csv") => ("CSV", table(file)),
+    let (format, track) = match ending(file).as_str() {
+        "ulg" => ("PX4", px4(file)),
+        "bin" => ("ArduPilot", ardupilot(file)),
+        "csv" => ("CSV", table(file)),
         _ => bail!("{name}: .ulg, .bin and .csv are accepted"),
     };
     let Track { mut samples, texts } = track.with_context(|| name.to_string())?;
@@ -122,12 +102,24 @@ pub fn import(file: &Path, output: &Path) -> Result<Imported> {
     let texts = texts.iter().map(|(time_s, text)| (time_s - first.time_s, text_event(Severity::Info, text)));
     let mut records: Vec<(f64, Record)> = sampled.chain(texts).collect();
     records.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut writer = LogWriter::new(BufWriter::new(NewFile::create(output)?), &header)?;
-    for (time_s, record) in &records {
-        writer.write(record, (time_s.max(0.0) * 1e9) as u64)?;
-    }
-    let output = writer.finish()?.into_inner().map_err(|error| error.into_error())?.commit()?;
+    let output = write_records(output, &header, &records)?;
     Ok(Imported { output, format, samples: count, lasted_s, missing })
+}
+
+/// A sample of position, m, and velocity, m/s, north-east-down.
+fn moving(
+    [north_m, east_m, down_m]: [Option<f64>; 3],
+    [north_m_s, east_m_s, down_m_s]: [Option<f64>; 3],
+) -> Telemetry {
+    Telemetry {
+        north_m,
+        east_m,
+        altitude_m: down_m.map(|down_m| -down_m),
+        north_m_s,
+        east_m_s,
+        climb_m_s: down_m_s.map(|down_m_s| -down_m_s),
+        ..Telemetry::default()
+    }
 }
 
 /// The local position, with the attitude before each sample.
@@ -157,19 +149,8 @@ fn px4(file: &Path) -> Result<Track> {
         Some(libm::acos(up.clamp(-1.0, 1.0)))
     };
     let sample = |(row, time_s): (usize, f64)| {
-        let [north_m, east_m, down_m] = position.each_ref().map(|values| values.get(row).copied());
-        let [north_m_s, east_m_s, down_m_s] = velocity.each_ref().map(|values| values.get(row).copied());
-        Telemetry {
-            time_s,
-            north_m,
-            east_m,
-            altitude_m: down_m.map(|down_m| -down_m),
-            north_m_s,
-            east_m_s,
-            climb_m_s: down_m_s.map(|down_m_s| -down_m_s),
-            tilt_rad: tilt_rad(time_s),
-            ..Telemetry::default()
-        }
+        let here = |columns: &[Vec<f64>; 3]| columns.each_ref().map(|values| values.get(row).copied());
+        Telemetry { time_s, tilt_rad: tilt_rad(time_s), ..moving(here(&position), here(&velocity)) }
     };
     Ok(Track { samples: times_s.into_iter().enumerate().map(sample).collect(), texts: Vec::new() })
 }
@@ -184,14 +165,8 @@ fn ardupilot(file: &Path) -> Result<Track> {
         match entry.name.as_str() {
             "XKF1" | "NKF1" if value("C").unwrap_or(0.0) <= 0.0 => track.samples.push(Telemetry {
                 time_s,
-                north_m: value("PN"),
-                east_m: value("PE"),
-                altitude_m: value("PD").map(|down_m| -down_m),
-                north_m_s: value("VN"),
-                east_m_s: value("VE"),
-                climb_m_s: value("VD").map(|down_m_s| -down_m_s),
                 tilt_rad: value("Pitch").map(|pitch_deg| (90.0 - pitch_deg).to_radians()),
-                ..Telemetry::default()
+                ..moving(["PN", "PE", "PD"].map(value), ["VN", "VE", "VD"].map(value))
             }),
             "MSG" => track.texts.extend(entry.get_str("Message").map(|text| (time_s, text.to_owned()))),
             _ => {}
@@ -207,7 +182,7 @@ type Column = (&'static [&'static str], fn(&mut Telemetry, f64));
 const COLUMNS: [Column; 8] = [
     (&["time", "time (s)"], |sample, value| sample.time_s = value),
     (&["height", "altitude agl (m)", "altitude (m)", "z (m)"], |sample, value| {
-        sample.altitude_m = Some(value)
+        sample.altitude_m = Some(value);
     }),
     (&["x (m)", "position east of launch (m)"], |sample, value| sample.east_m = Some(value)),
     (&["y (m)", "position north of launch (m)"], |sample, value| sample.north_m = Some(value)),

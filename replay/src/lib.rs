@@ -24,8 +24,7 @@
 //! * [`export`]: converts logs to other formats; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a
 //!   name that is free.
-//! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other,
-//!   JSON.
+//! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other.
 
 pub mod cli;
 pub mod compare;
@@ -102,7 +101,7 @@ enum Command {
     /// Open loop: what the controller alone would have commanded with other settings, on the
     /// recorded inputs.
     #[command(after_help = "Example: replay evaluate flight.mcap --set powered.weights.theta=90@6.5")]
-    Evaluate(evaluate::Args),
+    Evaluate(cli::WithSettings),
     /// Closed loop: flies a flight again from a chosen moment, with other settings.
     ///
     /// The flight is flown again from its start with the recorded draw up to that moment, because a
@@ -127,7 +126,7 @@ enum Command {
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
     /// Writes a log's content as CSV; replay-rerun writes a Rerun recording.
-    #[command(after_help = "Example: replay export flight.mcap --to csv --out tables")]
+    #[command(after_help = "Example: replay export flight.mcap --out tables")]
     Export(export::Args),
     /// Imports a flight of another program: PX4 (.ulg), ArduPilot (.bin), and .csv of AltOS,
     /// RocketPy and OpenRocket.
@@ -136,11 +135,11 @@ enum Command {
     /// ArduPilot. `info`, `report`, `compare` and `export` use it; it has no frames of a flight
     /// computer to run again.
     #[command(after_help = "Example: replay import flight.ulg flight.mcap")]
-    Import(import::Args),
+    Import(cli::FromTo),
     /// Recovers a readable log from a damaged one, and reports what was recovered and what time
     /// span is lost.
     #[command(after_help = "Example: replay recover cut.mcap whole.mcap")]
-    Recover(recover::Args),
+    Recover(cli::FromTo),
     /// Finds drag, thrust, delays, gimbal and wind of flights, with 95 % intervals, and says what
     /// it cannot find.
     ///
@@ -171,13 +170,13 @@ impl Cli {
         match self.command {
             Command::Info(args) => args.run(),
             Command::Verify(args) => args.run(),
-            Command::Evaluate(args) => args.run(),
+            Command::Evaluate(given) => evaluate::run(&given),
             Command::Refly(args) => args.run(),
             Command::Compare(args) => args.run(),
             Command::Report(args) => args.run(),
             Command::Export(args) => args.run(),
-            Command::Import(args) => args.run(),
-            Command::Recover(args) => args.run(),
+            Command::Import(files) => files.run(import::import),
+            Command::Recover(files) => files.run(recover::recover),
             Command::Fit(args) => args.run(),
             Command::Manual(manual) => Ok(manual.print(Self::command())?),
         }

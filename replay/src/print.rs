@@ -1,22 +1,9 @@
-//! What answers have in common: columns, two verdicts beside each other, JSON. `cli` removes what
-//! steers a terminal.
-
-use std::io;
-use std::io::Write;
+//! What answers have in common: columns, two verdicts beside each other. `cli` removes what steers
+//! a terminal.
 
 use protocol::log::v1::LimitResult;
-use serde::Serialize;
 
 use crate::log::Verdict;
-
-/// Writes any report as JSON.
-///
-/// # Errors
-/// The output failed.
-pub fn print_json(report: &impl Serialize, output: &mut impl Write) -> io::Result<()> {
-    serde_json::to_writer_pretty(&mut *output, report)?;
-    writeln!(output)
-}
 
 /// `1 frame`, `2 frames`.
 pub(crate) fn counted(count: u64, noun: &str) -> String {

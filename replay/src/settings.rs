@@ -5,11 +5,13 @@
 //! file of settings is a TOML file with the structure of the mission and only the keys to change.
 //! An unknown name is refused, and the most similar known name is suggested.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 
+use avionics::log::again::mission_flown;
 use flight::vehicle::mission::Mission;
+use protocol::log::computer_v1::ComputerStart;
 use sim::world::Truth;
 
 use crate::print::nearest;
@@ -34,19 +36,10 @@ pub enum SettingError {
     Form { given: String },
     /// The key is unknown.
     #[error("no setting `{given}`: did you mean `{nearest}`?")]
-    Unknown {
-        given: String,
-        /// The most similar known name.
-        nearest: String,
-    },
+    Unknown { given: String, nearest: String },
     /// The log's mission or a settings file is not TOML.
     #[error("{origin}: {reason}")]
-    Toml {
-        /// Which text.
-        origin: String,
-        /// The parser's message.
-        reason: String,
-    },
+    Toml { origin: String, reason: String },
     /// The mission or the truth is invalid with the settings.
     #[error("with {settings}: {reason}")]
     Mission { settings: String, reason: String },
@@ -77,9 +70,7 @@ impl FromStr for Setting {
 
 /// Parses a TOML value, or else takes the text: `consistent` needs no quotes on a command line.
 fn parsed_value(text: &str) -> toml::Value {
-    let table = format!("value = {text}").parse::<toml::Table>();
-    let value = table.ok().filter(|table| table.len() == 1).and_then(|mut table| table.remove("value"));
-    value.unwrap_or_else(|| toml::Value::String(text.to_owned()))
+    text.parse().unwrap_or_else(|_| toml::Value::String(text.to_owned()))
 }
 
 impl fmt::Display for Setting {
@@ -89,21 +80,14 @@ impl fmt::Display for Setting {
     }
 }
 
-/// Every setting that a mission's text states; `origin` is used in messages only. A whole number is
-/// the same as with a decimal point.
-///
-/// # Errors
-/// The text is not TOML.
-pub(crate) fn settings_of_mission(text: &str, origin: &str) -> Result<Vec<Setting>, SettingError> {
-    let table = text.parse().map_err(|error: toml::de::Error| SettingError::Toml {
-        origin: origin.to_owned(),
-        reason: error.to_string(),
-    })?;
-    let mut settings = Vec::new();
-    collect_leaves("", &table, &mut |path, value| {
-        settings.push(Setting { path, value: as_integer(value), at_s: None });
+/// Every setting that a mission's text states; `None` if it is not TOML. A whole number is the same
+/// as with a decimal point.
+pub(crate) fn settings_of_mission(text: &str) -> Option<BTreeMap<String, String>> {
+    let mut settings = BTreeMap::new();
+    collect_leaves("", &text.parse().ok()?, &mut |path, value| {
+        settings.insert(path, as_integer(value).to_string());
     });
-    Ok(settings)
+    Some(settings)
 }
 
 fn listed(settings: &[Setting]) -> String {
@@ -223,54 +207,46 @@ fn refusal(reason: &str, settings: &[Setting], known: &BTreeSet<String>) -> Sett
     SettingError::Unknown { given: given.clone(), nearest: nearest(given, known.iter()) }
 }
 
-/// A controller's settings over a flight: those of the beginning, and changes at given times.
+/// The missions of a flight: that of its beginning, and those of changes at given times.
 #[derive(Debug, Clone)]
-pub struct Schedule<T> {
-    base: T,
-    /// By time; each stage includes all earlier changes.
-    changes: Vec<(f64, T)>,
-    next: usize,
+pub struct Schedule {
+    pub(crate) base: Mission,
+    /// Still to come, by time; each includes all earlier changes.
+    changes: Vec<(f64, Mission)>,
 }
 
-impl<T> Schedule<T> {
-    /// Calls `build` for the settings from the beginning, then again with each timed one from its
-    /// time.
+impl Schedule {
+    /// The mission as at the release with the settings from the beginning, then again with each
+    /// timed one from its time.
     ///
     /// # Errors
-    /// Those of `build`.
-    pub fn of(
+    /// A name is unknown, or a mission is not valid.
+    pub(crate) fn of(
+        mission_toml: &str,
+        start: &ComputerStart,
         settings: &[Setting],
-        build: impl Fn(&[Setting]) -> Result<T, SettingError>,
     ) -> Result<Self, SettingError> {
-        let mut timed: Vec<&Setting> = settings.iter().filter(|setting| setting.at_s.is_some()).collect();
-        timed.sort_by(|a, b| a.at_s.unwrap_or(0.0).total_cmp(&b.at_s.unwrap_or(0.0)));
+        let build = |so_far: &[Setting]| -> Result<Mission, SettingError> {
+            let set = |path: &str| so_far.iter().any(|setting| setting.path == path);
+            Ok(mission_flown(mission_with(mission_toml, so_far)?, start, set))
+        };
         let mut so_far: Vec<Setting> =
             settings.iter().filter(|setting| setting.at_s.is_none()).cloned().collect();
-        let base = build(&so_far)?;
-        let mut changes: Vec<(f64, T)> = Vec::new();
-        for setting in timed {
+        let mut timed: Vec<(f64, &Setting)> =
+            settings.iter().filter_map(|setting| Some((setting.at_s?, setting))).collect();
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (base, mut changes) = (build(&so_far)?, Vec::new());
+        for (at_s, setting) in timed {
             so_far.push(setting.clone());
-            let at_s = setting.at_s.unwrap_or(0.0);
-            let stage = build(&so_far)?;
-            match changes.last_mut() {
-                // Changes at the same moment are one change.
-                Some((before_s, before)) if before_s.to_bits() == at_s.to_bits() => *before = stage,
-                _ => changes.push((at_s, stage)),
-            }
+            changes.push((at_s, build(&so_far)?));
         }
-        Ok(Self { base, changes, next: 0 })
+        Ok(Self { base, changes })
     }
 
-    /// The settings of the beginning.
-    pub fn base(&self) -> &T {
-        &self.base
-    }
-
-    /// The settings that take effect at this vehicle time, s, if any; times must not decrease.
-    pub fn due(&mut self, time_s: f64) -> Option<&T> {
-        let due = self.changes.iter().skip(self.next).take_while(|(at_s, _)| *at_s <= time_s).count();
-        self.next += due;
-        if due == 0 { None } else { self.changes.get(self.next - 1).map(|(_, stage)| stage) }
+    /// The mission that takes effect at this vehicle time, s, if any; times must not decrease.
+    pub(crate) fn due(&mut self, time_s: f64) -> Option<Mission> {
+        let due = self.changes.partition_point(|(at_s, _)| *at_s <= time_s);
+        self.changes.drain(..due).next_back().map(|(_, mission)| mission)
     }
 }
 

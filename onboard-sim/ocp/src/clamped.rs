@@ -7,7 +7,8 @@
 //!
 //! ```text
 //! input      free, or at its lower or upper limit
-//! condition  held at zero, its multiplier free; or the multiplier at an end of its range (`barrier`), the value free
+//! condition  held at zero, its multiplier free;
+//!            or the multiplier at an end of its range (`barrier`), the value free
 //! ```
 //!
 //! After each step an input beyond its limit is put on the limit, and an input that pulls away from

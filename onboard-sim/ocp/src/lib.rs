@@ -8,7 +8,8 @@
 //! (multiple shooting):
 //!
 //! ```text
-//! minimise    sum over nodes of L_k(x_k)  +  sum over intervals of R_k(u_k)  +  M (violations of the conditions)
+//! minimise    sum over nodes of L_k(x_k)  +  sum over intervals of R_k(u_k)
+//!             +  M (violations of the conditions)
 //! subject to  x_{k+1} = F_k(x_k, u_k),   x_0 given,   lower <= u_k <= upper
 //! ```
 //!

@@ -526,10 +526,10 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time
-    /// ([`MotorEstimate::nees_of_scales`]); `None` before the motor has ignited. The accelerometer
-    /// cannot distinguish more impulse from less mass.
+    /// ([`nees_of_scales`][scales]); `None` before the motor has ignited. The accelerometer cannot
+    /// distinguish more impulse from less mass.
     ///
-    /// [`MotorEstimate::nees_of_scales`]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
+    /// [scales]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
         self.measured().filter(|_| !self.dead)?;
         let motor = self.pilot().motor();

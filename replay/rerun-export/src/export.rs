@@ -73,7 +73,6 @@ pub struct Exported {
 /// # Errors
 /// A log cannot be used, or the recording cannot be written.
 pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<(PathBuf, Vec<Exported>), ExportError> {
-    let cannot_write = WriteError::at(to);
     let mut file = NewFile::create(to)?;
     let own = Survey::of(log)?;
     let stem = log.file_stem().unwrap_or_default().to_string_lossy();
@@ -94,7 +93,7 @@ pub fn export(log: &Path, beside: Option<&Path>, to: &Path) -> Result<(PathBuf, 
         topics.extend(other.topics);
     }
     layout(&topics).send(&recording, rerun::blueprint::BlueprintActivation::default())?;
-    file.write_all(&messages.drain_as_bytes()?).map_err(cannot_write)?;
+    file.write_all(&messages.drain_as_bytes()?).map_err(WriteError::at(to))?;
     Ok((file.commit()?, exported))
 }
 
@@ -134,12 +133,11 @@ impl Survey {
         found.start_ns = start_ns.and_then(|start_ns| i64::try_from(start_ns).ok()).unwrap_or(0);
         found.topics = log.channels().map(|(_, channel)| channel.topic.clone()).collect();
         found.exported.damage = log.damage().map(ToString::to_string);
-        match head.profile_toml.as_ref().and_then(|text| text.as_ref().ok()) {
-            None => {}
-            Some(text) => match flight::vehicles::mission::from_toml(text, "profile.toml") {
+        if let Some(Ok(text)) = &head.profile_toml {
+            match flight::vehicles::mission::from_toml(text, "profile.toml") {
                 Ok(mission) => found.mission = Some(mission),
                 Err(error) => found.exported.mission_problem = Some(error.to_string()),
-            },
+            }
         }
         Ok(found)
     }

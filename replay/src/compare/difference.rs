@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Series;
 
 /// The difference of one signal between two flights.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SignalDifference {
     pub signal: String,
     /// Times compared.
@@ -28,13 +28,8 @@ impl SignalDifference {
     pub(super) fn of(signal: &str, a: &Series, b: &Series, shift_s: f64) -> Self {
         let mut found = Self {
             signal: signal.to_owned(),
-            samples: 0,
-            samples_outside: 0,
             samples_of: [a.times_s.len(), b.times_s.len()],
-            rms: 0.0,
-            max: 0.0,
-            max_at_s: None,
-            not_comparable: false,
+            ..Self::default()
         };
         let mut squares = 0.0;
         for (time_s, value) in a.times_s.iter().zip(&a.values) {

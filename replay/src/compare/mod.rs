@@ -9,7 +9,6 @@
 //! Two folders of logs are compared as sets of flights ([`compare_sets`]).
 
 mod difference;
-mod missions;
 mod print;
 mod series;
 mod sets;
@@ -19,7 +18,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 pub use difference::SignalDifference;
-pub(crate) use missions::compared;
 use protocol::program::Exit;
 use serde::Serialize;
 pub use series::{Align, Flown, Series};
@@ -174,11 +172,8 @@ impl Args {
             return give(&compare_sets(&self.baseline, other)?, self.json);
         }
         let baseline = open(&self.baseline)?;
-        let mut comparisons = Vec::new();
-        for path in &self.others {
-            comparisons.push(compare(&baseline, &open(path)?));
-        }
-        give(&comparisons, self.json)
+        let comparisons = self.others.iter().map(|path| Ok(compare(&baseline, &open(path)?)));
+        give(&comparisons.collect::<Result<Vec<_>>>()?, self.json)
     }
 }
 

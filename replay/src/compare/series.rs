@@ -7,7 +7,7 @@ use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use crate::log::{Cut, FlightLog, RecordingError, Verdict};
-use crate::table::{Cell, Column, FLIGHT_TIME_S, Kind, TableReader, TableShape};
+use crate::table::{Cell, Column, FLIGHT_TIME_S, Kind, TableReader};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
@@ -95,19 +95,19 @@ impl Flown {
         // By table and column; `None` of a column that is no signal.
         let mut read: Vec<Vec<Option<Series>>> = Vec::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
-        let mut reader = TableReader::new();
+        let mut reader = TableReader::default();
         reader.read::<_, RecordingError>(&mut log, |shape, row| {
             let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
             let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
             if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) || shape.name.starts_with(MESSAGES) {
                 return Ok(());
             }
-            let time_s = if let Some(place) = shape.place_of(FLIGHT_TIME_S) {
-                // Outside the flight a frame has no time in it.
-                row.cells.get(place).and_then(Cell::number)
-            } else {
-                time_of(shape, &row.cells).or(Some(since_s))
-            };
+            let number = |column: &str| Some(row.cells.get(shape.place_of(column)?)?.number());
+            // Outside the flight a frame has no time in it.
+            let time_s = number(FLIGHT_TIME_S).unwrap_or_else(|| {
+                let recorded_s = number("time_s").flatten().filter(|time_s| time_s.is_finite());
+                recorded_s.or(Some(since_s))
+            });
             let Some(time_s) = time_s else { return Ok(()) };
             read.resize_with(read.len().max(row.table + 1), Vec::new);
             let columns = &mut read[row.table];
@@ -134,34 +134,28 @@ impl Flown {
             let too_long = || RecordingError::TooLong { name: name.clone(), kind: "numbers" };
             if held > VALUES_MAX { Err(too_long()) } else { Ok(()) }
         })?;
-        log.flights().refuse_several(&name)?;
+        log.flights.refuse_several(&name)?;
         let mut signals = BTreeMap::<String, Series>::new();
         // The limits and times of a verdict stand beside the signals.
-        for (shape, columns) in reader.shapes().iter().zip(read).filter(|(shape, _)| shape.name != "verdict")
-        {
+        for (shape, columns) in reader.shapes.iter().zip(read).filter(|(shape, _)| shape.name != "verdict") {
             for (column, series) in shape.columns.iter().zip(columns) {
                 let series = series.filter(|series| !series.values.is_empty());
                 signals.extend(series.map(|series| (format!("{}.{}", shape.name, column.name), series)));
             }
         }
         let ignited = |signal: &str| {
-            let ignited = |phase: f64| Phase::from_index(phase as u8).is_some_and(Phase::in_landing_burn);
-            let series = signals.get(signal)?;
-            series
-                .times_s
-                .iter()
-                .zip(&series.values)
-                .find(|(_, phase)| ignited(**phase))
-                .map(|(at_s, _)| *at_s)
+            let ignited = |phase: &f64| Phase::from_index(*phase as u8).is_some_and(Phase::in_landing_burn);
+            let Series { times_s, values, .. } = signals.get(signal)?;
+            times_s.get(values.iter().position(ignited)?).copied()
         };
         let ignition_s = ignited("computer_frame.output.phase").or_else(|| ignited("telemetry.phase"));
         Ok(Self {
             name,
             signals,
             ignition_s,
-            verdict: log.verdict().as_ref().map(Verdict::found),
+            verdict: log.verdict(),
             damage: log.damage().map(ToString::to_string),
-            cut: log.flights().cut(),
+            cut: log.flights.cut(),
             out_of_order,
         })
     }
@@ -169,12 +163,6 @@ impl Flown {
 
 fn is_signal(column: &str) -> bool {
     !NO_SIGNALS.contains(&column) && !NO_SIGNALS_OF.iter().any(|beginning| column.starts_with(beginning))
-}
-
-/// The vehicle time in the record, s.
-fn time_of(shape: &TableShape, cells: &[Cell]) -> Option<f64> {
-    let place = shape.place_of("time_s")?;
-    cells.get(place)?.number().filter(|time_s| time_s.is_finite())
 }
 
 /// The event on which the flights are aligned.

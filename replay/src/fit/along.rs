@@ -423,29 +423,22 @@ pub(super) fn fit_along(trace: &Trace, thrust_along: &dyn Fn(f64) -> f64) -> Res
     let speed_share =
         at_ignition.sigmas.velocity_m_s.z / at_ignition.state.velocity_m_s.norm().max(SLOWEST_M_S);
     let commanded_s = series.commanded_s;
-    let found = |solution, burn_seen_s| Along {
-        solution,
-        body_share,
-        updraught_m_s,
-        commanded_s,
-        burn_seen_s,
-        speed_share,
-    };
     let burnt = match commanded_s {
         None => Err("the motor was not ignited".to_owned()),
         Some(at_s) => sound::check(trace, &series.frames[series.fallen - 1..], true)
             .and_then(|()| series.burn(at_s, priors.clone(), updraught_m_s)),
     };
-    match burnt {
-        Ok((solution, seen_s)) => Ok(found(solution, Ok(seen_s))),
+    let (solution, burn_seen_s) = match burnt {
+        Ok((solution, seen_s)) => (solution, Ok(seen_s)),
         Err(reason) => {
             let whitener = series.noises(series.fallen, updraught_m_s);
             let residuals = |values: &[f64]| whitener.apply(&series.missed_in_fall(values));
             let mut solution = solve(&priors, residuals).ok_or(NOT_SOLVED)?;
             inflate(&mut solution, residuals, BLOCK);
-            Ok(found(solution, Err(reason)))
+            (solution, Err(reason))
         }
-    }
+    };
+    Ok(Along { solution, body_share, updraught_m_s, commanded_s, burn_seen_s, speed_share })
 }
 
 /// Nothing is known of a scale but its size.

@@ -60,7 +60,7 @@ pub(super) fn solve_from(
     let mut damping = 1e-4;
     let mut information = DMatrix::zeros(0, 0);
     for _ in 0..ROUNDS {
-        let jacobian = derivatives(&values, priors, &residuals, now.len());
+        let jacobian = derivatives(&values, priors, &residuals);
         let mut gradient = jacobian.tr_mul(&DVector::from_column_slice(&now));
         information = jacobian.tr_mul(&jacobian);
         for (place, prior) in priors.iter().enumerate() {
@@ -106,7 +106,7 @@ pub(super) fn solve_from(
 pub(super) fn inflate(solution: &mut Solution, residuals: impl Fn(&[f64]) -> Vec<f64>, block: usize) {
     let Solution { values, priors, .. } = &*solution;
     let now = residuals(values);
-    let jacobian = derivatives(values, priors, &residuals, now.len());
+    let jacobian = derivatives(values, priors, &residuals);
     let count = priors.len();
     let mut pushed = DMatrix::zeros(count, count);
     let mut blocks = 0_u32;
@@ -124,37 +124,24 @@ pub(super) fn inflate(solution: &mut Solution, residuals: impl Fn(&[f64]) -> Vec
         pushed[(place, place)] += 1.0 / (prior.sigma * prior.sigma);
     }
     let sandwich = &solution.covariance * pushed * &solution.covariance;
-    let wider: Vec<f64> = (0..count)
-        .map(|place| libm::sqrt((sandwich[(place, place)] / solution.covariance[(place, place)]).max(1.0)))
-        .collect();
-    for row in 0..count {
-        for column in 0..count {
-            solution.covariance[(row, column)] *= wider[row] * wider[column];
-        }
-    }
+    let wider = sandwich.diagonal().zip_map(&solution.covariance.diagonal(), |sandwich, covariance| {
+        libm::sqrt((sandwich / covariance).max(1.0))
+    });
+    solution.covariance.component_mul_assign(&(&wider * wider.transpose()));
 }
 
 /// Central differences.
-fn derivatives(
-    values: &[f64],
-    priors: &[Prior],
-    residuals: &impl Fn(&[f64]) -> Vec<f64>,
-    rows: usize,
-) -> DMatrix<f64> {
-    let mut jacobian = DMatrix::zeros(rows, values.len());
-    for (place, prior) in priors.iter().enumerate() {
+fn derivatives(values: &[f64], priors: &[Prior], residuals: &impl Fn(&[f64]) -> Vec<f64>) -> DMatrix<f64> {
+    let column = |(place, prior): (usize, &Prior)| {
         let step = STEP * prior.sigma;
         let beside = |by: f64| {
             let mut moved = values.to_vec();
             moved[place] += by;
-            residuals(&moved)
+            DVector::from_vec(residuals(&moved))
         };
-        let (ahead, behind) = (beside(step), beside(-step));
-        for (row, (ahead, behind)) in ahead.iter().zip(&behind).enumerate() {
-            jacobian[(row, place)] = (ahead - behind) / (2.0 * step);
-        }
-    }
-    jacobian
+        (beside(step) - beside(-step)) / (2.0 * step)
+    };
+    DMatrix::from_columns(&priors.iter().enumerate().map(column).collect::<Vec<_>>())
 }
 
 /// The disturbance between one sample and the next, and how the sample shows it.

@@ -48,7 +48,7 @@ use self::calibration::{Calibration, Table};
 use self::day::Learnt;
 use self::least_squares::Solution;
 pub use self::trace::{Frame, Trace};
-use crate::cli::{Answer, give, print_error, print_note, text_of, warn_of_loss};
+use crate::cli::{Answer, ending, give, print_error, print_note, text_of, warn_of_loss};
 use crate::info::utc;
 use crate::log::Recording;
 use crate::output::NewFile;
@@ -686,11 +686,6 @@ fn once_each(fits: &mut Vec<Fit>) {
         known.insert(content.clone(), fit.source.clone());
         true
     });
-}
-
-/// What a file's name ends in: json, csv, or anything else for a log.
-fn ending(file: &Path) -> String {
-    file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }
 
 fn curve_of(motor: &str) -> Result<ThrustCurve> {

@@ -1,8 +1,6 @@
 //! What a flight's log gives to a fit: sensor samples, commands and the flight computer's own
 //! estimates. The simulated truth that some logs have beside them is never read.
 
-use std::path::Path;
-
 use avionics::log::frame::{commands_from_log, input_from_log, phase_of};
 use avionics::log::logged::{At, Logged, RecordError};
 use flight::computer::{Commands, SensedInput};
@@ -129,19 +127,10 @@ impl Trace {
         });
     }
 
-    /// Reads a vehicle's log.
-    ///
-    /// # Errors
-    /// Names what the log lacks: it cannot be read, is too long, or has several flights, no
-    /// usable mission, or no frames.
-    pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        Self::of(&Recording::open(path)?)
-    }
-
     /// What a recorded flight gives.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// Names what the log lacks: it has no usable mission, or no frames.
     pub fn of(recording: &Recording) -> Result<Self, RecordingError> {
         /// What is remembered after so many frames of noise is remembered in no other flight.
         const NAMING_FRAMES: usize = 100;

@@ -154,6 +154,9 @@ struct Rest {
     rough: f64,
 }
 
+/// The process with another number.
+type WithNumber = fn(Rest, f64) -> Rest;
+
 impl Rest {
     fn whitener(&self, samples: &[Sample], white: f64) -> Whitener {
         let kept = libm::exp(-FRAME_S / self.lasts_s);
@@ -181,20 +184,15 @@ impl Rest {
             let whitener = rest.whitener(samples, white);
             missed.iter().map(|axis| whitener.surprise(axis)).sum::<f64>()
         };
-        let mut rest = self;
-        for _ in 0..2 {
-            let of_sigma = |logarithm: f64| Self { sigma_rad_s2: libm::exp(logarithm), ..rest };
-            let sigma_rad_s2 =
-                libm::exp(lowest(libm::log(0.01), libm::log(30.0), 14, |at| surprise(of_sigma(at))));
-            rest = Self { sigma_rad_s2, ..rest };
-            let of_time = |logarithm: f64| Self { lasts_s: libm::exp(logarithm), ..rest };
-            let lasts_s = libm::exp(lowest(libm::log(0.02), libm::log(5.0), 14, |at| surprise(of_time(at))));
-            rest = Self { lasts_s, ..rest };
-            let of_rough = |logarithm: f64| Self { rough: libm::exp(logarithm), ..rest };
-            let rough = libm::exp(lowest(libm::log(1e-4), libm::log(1.0), 14, |at| surprise(of_rough(at))));
-            rest = Self { rough, ..rest };
-        }
-        rest
+        let numbers: [(f64, f64, WithNumber); 3] = [
+            (0.01, 30.0, |rest, sigma_rad_s2| Self { sigma_rad_s2, ..rest }),
+            (0.02, 5.0, |rest, lasts_s| Self { lasts_s, ..rest }),
+            (1e-4, 1.0, |rest, rough| Self { rough, ..rest }),
+        ];
+        numbers.repeat(2).into_iter().fold(self, |rest, (from, to, with)| {
+            let found = |logarithm: f64| with(rest, libm::exp(logarithm));
+            found(lowest(libm::log(from), libm::log(to), 14, |logarithm| surprise(found(logarithm))))
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
-use onboard_sim::statistics::quantile;
+use onboard_sim::statistics::{quantile, sorted};
 use protocol::dialect::TdInterlock;
 use protocol::log::flight_v1::PilotTiming;
 use protocol::log::reader::LogChannel;
@@ -57,44 +57,34 @@ impl ChannelCounter {
         channels: impl Iterator<Item = (u16, &'a LogChannel)>,
         share_a_counter: bool,
     ) -> Vec<Channel> {
-        let mut facts: Vec<Channel> = channels
-            .map(|(id, channel)| {
-                let counts = self.counts.remove(&id).unwrap_or_default();
-                // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
-                let unnumbered = counts.last_sequence == 0 || share_a_counter;
-                let numbered = if unnumbered { 0 } else { u64::from(counts.last_sequence) + 1 };
-                Channel {
-                    topic: channel.topic.clone(),
-                    message_encoding: channel.message_encoding.clone(),
-                    schema: channel.schema_name.clone(),
-                    metadata: channel.metadata.clone(),
-                    messages: counts.messages,
-                    unreadable: counts.unreadable,
-                    // Those that there should be, so far.
-                    lost: numbered,
-                }
-            })
-            .collect();
-        facts.sort_by(|a, b| (&a.topic, &a.metadata).cmp(&(&b.topic, &b.metadata)));
         // A program that joined logs has given each part channels of its own.
-        facts.dedup_by(|more, first| {
-            let same = (&first.topic, &first.metadata) == (&more.topic, &more.metadata);
-            if same {
-                first.messages += more.messages;
-                first.unreadable += more.unreadable;
-                first.lost = first.lost.max(more.lost);
-            }
-            same
-        });
-        for channel in &mut facts {
-            channel.lost = channel.lost.saturating_sub(channel.messages);
+        let mut facts: BTreeMap<_, Channel> = BTreeMap::new();
+        for (id, LogChannel { topic, message_encoding, schema_name, metadata, .. }) in channels {
+            let counts = self.counts.remove(&id).unwrap_or_default();
+            // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
+            let unnumbered = counts.last_sequence == 0 || share_a_counter;
+            let numbered = if unnumbered { 0 } else { u64::from(counts.last_sequence) + 1 };
+            let fact = facts.entry((topic, metadata)).or_insert_with(|| Channel {
+                topic: topic.clone(),
+                message_encoding: message_encoding.clone(),
+                schema: schema_name.clone(),
+                metadata: metadata.clone(),
+                messages: 0,
+                unreadable: 0,
+                lost: 0,
+            });
+            fact.messages += counts.messages;
+            fact.unreadable += counts.unreadable;
+            // Those that there should be, so far.
+            fact.lost = fact.lost.max(numbered);
         }
-        facts
+        let lost = |fact: Channel| Channel { lost: fact.lost.saturating_sub(fact.messages), ..fact };
+        facts.into_values().map(lost).collect()
     }
 }
 
 /// The frames of the flight computer.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Frames {
     /// The lowest number.
     pub first: u64,
@@ -118,77 +108,63 @@ pub struct Frames {
 /// Counts frames.
 #[derive(Debug, Default)]
 pub(super) struct FrameCounter {
-    /// The lowest and the highest number.
-    bounds: Option<(u64, u64)>,
+    /// `None` before the first frame.
+    found: Option<Frames>,
     order: FrameOrder,
-    restarts: usize,
-    repeated: u64,
-    lost: usize,
-    first_lost: Option<Gap>,
-    latencies: LatencyCounter,
-    /// Notes the start record of the flight computer.
-    start: bool,
+    /// Latency and deadline of each plan, s.
+    plans: Vec<[f64; 2]>,
+    /// The start record of the flight computer was read.
+    pub(super) start: bool,
 }
 
 impl FrameCounter {
-    pub(super) fn start(&mut self) {
-        self.start = true;
-    }
-
     /// Counts a frame and the records lost before it. Returns whether the computer was reset
     /// between it and the frame before.
     pub(super) fn count(&mut self, frame: u64, lost_before: u32) -> bool {
         let before = self.order.last_frame;
+        let gap = self.order.note(frame, lost_before);
+        let is_first = self.found.is_none();
+        let found = self.found.get_or_insert(Frames { first: frame, last: frame, ..Frames::default() });
         let mut reset = false;
-        if let Some(gap) = self.order.note(frame, lost_before) {
-            self.lost += 1;
-            self.first_lost.get_or_insert(gap);
-        } else if self.bounds.is_some() {
-            self.restarts += usize::from(frame > before.saturating_add(1));
+        if let Some(gap) = gap {
+            found.lost += 1;
+            found.first_lost.get_or_insert(gap);
+        } else if !is_first {
+            found.restarts += usize::from(frame > before.saturating_add(1));
             // A frame that was late is no reset.
             reset = frame > before.saturating_add(2);
         }
         // A number that is not above every one before it.
-        self.repeated += u64::from(self.bounds.is_some_and(|(_, last)| frame <= last));
-        let (first, last) = self.bounds.unwrap_or((frame, frame));
-        self.bounds = Some((first.min(frame), last.max(frame)));
+        found.repeated += u64::from(!is_first && frame <= found.last);
+        (found.first, found.last) = (found.first.min(frame), found.last.max(frame));
         reset
     }
 
     pub(super) fn time(&mut self, timing: &PilotTiming) {
-        self.latencies.count(timing.solve_time_s, timing.deadline_s);
+        if self.plans.len() < PLANS_MAX {
+            self.plans.push([timing.solve_time_s, timing.deadline_s]);
+        }
     }
 
     pub(super) fn into_facts(self) -> Option<Frames> {
-        let Self { bounds, restarts, repeated, lost, first_lost, start, .. } = self;
-        let (first, last) = bounds?;
-        let latency = self.latencies.into_facts();
-        Some(Frames { first, last, restarts, lost, first_lost, repeated, start, latency, solver_work: None })
+        Some(Frames { start: self.start, latency: PlanningLatency::of(&self.plans), ..self.found? })
     }
 }
 
 impl Grade {
     pub(super) fn of_frames(frames: &Frames, profile: Option<&Profile>) -> Self {
         let numeric = |why: &str| Self { level: GradeLevel::Numeric, reason: format!("frames, but {why}") };
-        match profile {
-            _ if !frames.start => numeric("no start record of the flight computer"),
-            None => numeric("no attachment profile.toml to build the flight computer from"),
-            Some(Profile { problem: Some(problem), .. }) => numeric(problem),
-            Some(Profile { name, .. }) => {
-                Self::of_replayable_frames(frames, name.as_deref().unwrap_or_default())
-            }
-        }
-    }
-
-    /// The grade of a log whose frames can be executed again up to the first loss.
-    fn of_replayable_frames(frames: &Frames, mission: &str) -> Self {
+        let mission = match profile {
+            _ if !frames.start => return numeric("no start record of the flight computer"),
+            None => return numeric("no attachment profile.toml to build the flight computer from"),
+            Some(Profile { problem: Some(problem), .. }) => return numeric(problem),
+            Some(Profile { name, .. }) => name.as_deref().unwrap_or_default(),
+        };
+        // They can be executed again up to the first loss.
         let Frames { first, last, lost, first_lost, repeated, .. } = frames;
-        let level = GradeLevel::BitExact;
         let reason = match first_lost {
             Some(Gap { after: 0, before }) => {
-                let reason =
-                    format!("frames, but they begin with frame {before}, and those before it are lost");
-                return Self { level: GradeLevel::Numeric, reason };
+                return numeric(&format!("they begin with frame {before}, and those before it are lost"));
             }
             Some(Gap { after, before }) => {
                 let more = if *lost > 1 { format!(", the first of {lost} gaps") } else { String::new() };
@@ -203,7 +179,7 @@ impl Grade {
                 "frames {first} to {last} of the flight computer, its start and its mission {mission}"
             ),
         };
-        Self { level, reason }
+        Self { level: GradeLevel::BitExact, reason }
     }
 }
 
@@ -217,16 +193,6 @@ pub enum PhaseSource {
     Vehicle,
     /// A ground station's telemetry.
     Telemetry,
-}
-
-impl PhaseSource {
-    /// The source's name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Vehicle => "vehicle's frames",
-            Self::Telemetry => "ground station's telemetry",
-        }
-    }
 }
 
 /// The phases from one source.
@@ -363,8 +329,8 @@ impl EndingTracker {
     }
 }
 
-/// Limit on the times kept for the percentiles: 8 MB, more than a day of flight at 10 Hz.
-const TIMES_MAX: usize = 1_000_000;
+/// Limit on the plans kept for the percentiles: 16 MB, more than a day of flight at 10 Hz.
+const PLANS_MAX: usize = 1_000_000;
 
 /// Newton iterations of the plans of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -376,15 +342,15 @@ pub struct SolverWork {
 
 impl SolverWork {
     /// `None` without a plan.
-    pub(super) fn of(mut iterations: Vec<f64>) -> Option<Self> {
-        iterations.sort_by(f64::total_cmp);
+    pub(super) fn of(iterations: Vec<f64>) -> Option<Self> {
+        let iterations = sorted(iterations.into_iter());
         let [median, max] = [0.5, 1.0].map(|share| quantile(&iterations, share));
         Some(Self { plans: iterations.len(), median: median?, max: max? })
     }
 }
 
 /// Planning latencies: from the request of a plan to its use, on the vehicle's clock.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PlanningLatency {
     /// Number of measurements.
     pub count: u64,
@@ -399,34 +365,19 @@ pub struct PlanningLatency {
     pub over_deadline: u64,
 }
 
-/// Counts planning latencies.
-#[derive(Debug, Default)]
-pub(super) struct LatencyCounter {
-    times_s: Vec<f64>,
-    /// All but the quantiles.
-    found: Option<PlanningLatency>,
-}
-
-impl LatencyCounter {
-    pub(super) fn count(&mut self, time_s: f64, deadline_s: f64) {
-        if self.times_s.len() < TIMES_MAX {
-            self.times_s.push(time_s);
-        }
-        let PlanningLatency { count, deadline_s: least_s, over_deadline, .. } =
-            self.found.unwrap_or(PlanningLatency { deadline_s, ..PlanningLatency::default() });
-        self.found = Some(PlanningLatency {
-            count: count + 1,
-            deadline_s: least_s.min(deadline_s),
-            over_deadline: over_deadline + u64::from(time_s > deadline_s),
-            ..PlanningLatency::default()
-        });
-    }
-
-    /// `None` if nothing was measured.
-    pub(super) fn into_facts(mut self) -> Option<PlanningLatency> {
-        self.times_s.sort_by(f64::total_cmp);
-        let [median_s, p99_s, max_s] = [0.5, 0.99, 1.0].map(|share| quantile(&self.times_s, share));
-        Some(PlanningLatency { median_s: median_s?, p99_s: p99_s?, max_s: max_s?, ..self.found? })
+impl PlanningLatency {
+    /// Of latencies and deadlines, s; `None` if nothing was measured.
+    fn of(plans: &[[f64; 2]]) -> Option<Self> {
+        let times_s = sorted(plans.iter().map(|[time_s, _]| *time_s));
+        let [median_s, p99_s, max_s] = [0.5, 0.99, 1.0].map(|share| quantile(&times_s, share));
+        Some(Self {
+            count: plans.len() as u64,
+            median_s: median_s?,
+            p99_s: p99_s?,
+            max_s: max_s?,
+            deadline_s: plans.iter().map(|[_, deadline_s]| *deadline_s).reduce(f64::min)?,
+            over_deadline: plans.iter().filter(|[time_s, deadline_s]| time_s > deadline_s).count() as u64,
+        })
     }
 }
 

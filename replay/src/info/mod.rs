@@ -11,6 +11,8 @@ pub(crate) use self::counts::RESET;
 pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, PlanningLatency, SolverWork};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
+use flight::vehicle::mission::Mission;
+use flight::vehicles::mission::from_toml;
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
@@ -41,10 +43,11 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
     let mut work = Vec::new();
     let recording = Recording::open_from_power_up(path).map_err(|error| error.to_string());
     let found = recording.and_then(|recording| {
-        findings::of(&recording, info.verdict.as_ref(), |computer, _, frame| {
+        let again = findings::run_again(&recording, |computer, _, frame| {
             let plan = new_plan(computer.pilot(), &frame.output);
             work.extend(plan.map(|_| computer.pilot().report().iterations as f64));
-        })
+        });
+        findings::facts(&recording, again.and_then(|(_, findings)| findings))
     });
     if let Some(frames) = info.frames.as_mut().filter(|_| found.is_ok()) {
         frames.solver_work = SolverWork::of(work);
@@ -69,13 +72,13 @@ pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
 pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
     let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
-        let flights = log.flights().found().len();
+        let flights = log.flights.found.len();
         if flights > seen.flights {
             // The last verdict is shown: phases and outcome are of the same flight.
             seen.vehicle_phases = PhaseTracker::default();
             (seen.ending, seen.flights) = (EndingTracker::default(), flights);
         }
-        seen.take(&stamped, &log.clocks());
+        seen.take(&stamped, &log.clocks);
     }
     Ok(seen.into_info(log))
 }
@@ -113,7 +116,7 @@ impl Seen {
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert_with(|| reason.clone());
             }
-            Entry::ComputerStart(_) => self.frames.start(),
+            Entry::ComputerStart(_) => self.frames.start = true,
             Entry::PilotTiming(timing) => self.frames.time(timing),
             Entry::ComputerFrame(frame) => {
                 let reset = self.frames.count(frame.record.input.frame, stamped.lost_before);
@@ -140,10 +143,10 @@ impl Seen {
         let span = self.span.map(|(first_ns, last_ns)| Span {
             first_ns,
             last_ns,
-            duration_s: seconds(last_ns.saturating_sub(first_ns)),
+            duration_s: last_ns.saturating_sub(first_ns) as f64 / 1e9,
         });
         let channels = self.channels.into_facts(log.channels(), log.missing_of_all().is_some());
-        let verdict = log.verdict().as_ref().map(Verdict::found);
+        let verdict = log.verdict();
         let ending = self.ending.words(verdict.as_ref());
         let resets = self.vehicle_phases.resets;
         let after_reset = |ending| match resets {
@@ -181,7 +184,7 @@ impl Seen {
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
             findings: None,
             not_looked_for: None,
-            clocks: log.clocks(),
+            clocks: log.clocks,
             unreadable: self.unreadable,
             attachments: head.attachments.clone(),
         }
@@ -316,14 +319,11 @@ pub struct Profile {
 
 impl Profile {
     pub(super) fn of(head: &Head) -> Option<Self> {
-        let parsed = match head.profile_toml.as_ref()? {
-            Ok(text) => flight::vehicles::mission::from_toml(text, "profile.toml")
-                .map(|mission| (mission.name, mission.summary, mission.changed))
-                .map_err(|error| error.to_string()),
-            Err(error) => Err(error.to_string()),
-        };
-        Some(match parsed {
-            Ok((name, summary, changed)) => {
+        let text = head.profile_toml.as_ref()?.as_ref().map_err(ToString::to_string);
+        let mission =
+            text.and_then(|text| from_toml(text, "profile.toml").map_err(|error| error.to_string()));
+        Some(match mission {
+            Ok(Mission { name, summary, changed, .. }) => {
                 Self { name: Some(name), summary: Some(summary), changed, problem: None }
             }
             Err(problem) => Self { name: None, summary: None, changed: Vec::new(), problem: Some(problem) },
@@ -375,7 +375,7 @@ impl Completeness {
     }
 
     fn of<R: Read>(log: &FlightLog<R>, span: Option<&Span>, channels: &[Channel]) -> Self {
-        let (damage, cut) = (log.damage(), log.flights().cut());
+        let (damage, cut) = (log.damage(), log.flights.cut());
         let missing = u64::from(log.missing_of_all().unwrap_or(0));
         let messages_lost = missing + channels.iter().map(|channel| channel.lost).sum::<u64>();
         Self {
@@ -385,14 +385,10 @@ impl Completeness {
             checksummed: None,
             readable_until_s: span.map(|span| span.duration_s),
             messages_lost,
-            flights: log.flights().flown(),
+            flights: log.flights.flown(),
             cut,
         }
     }
-}
-
-fn seconds(ns: u64) -> f64 {
-    ns as f64 / 1e9
 }
 
 /// Most phases that are shown; a flight has about ten.
@@ -454,7 +450,9 @@ impl Info {
             {
                 rows.extend(limits.iter().filter(|limit| !limit.passed).map(|limit| {
                     let LimitResult { name, value, unit, .. } = limit;
-                    let (minimum, maximum) = (rounded(limit.minimum), rounded(limit.maximum));
+                    // Without the error of converting degrees to radians and back.
+                    let [minimum, maximum] =
+                        [limit.minimum, limit.maximum].map(|end| (end * 1e6).round() / 1e6);
                     let value = format!("{value:.4} {unit} is").replace("  ", " ");
                     ("", format!("{whose}{name} {value} {} {minimum} to {maximum}", beyond(limit)))
                 }));
@@ -551,11 +549,17 @@ impl Frames {
         if *repeated > 0 {
             rows.push(("", format!("{repeated} repeated")));
         }
-        let times = latency.as_ref().map_or_else(
-            || "latency not recorded: no plan was timed".to_owned(),
-            |times| format!("{}, of {}", latency_text(times), counted(times.count, "plan")),
-        );
-        rows.push(("planning", times));
+        // From the request of a plan to its use, on the vehicle's clock: of a simulated flight it
+        // is simulated, and says nothing of this machine.
+        rows.push(("planning", match latency {
+            None => "latency not recorded: no plan was timed".to_owned(),
+            Some(PlanningLatency { count, median_s, p99_s, max_s, deadline_s, over_deadline }) => {
+                let [median_ms, p99_ms, max_ms, deadline_ms] =
+                    [median_s, p99_s, max_s, deadline_s].map(|time_s| time_s * 1e3);
+                let plans = counted(*count, "plan");
+                format!("latency median {median_ms:.2} ms, p99 {p99_ms:.2} ms, worst {max_ms:.2} ms from request to use on the vehicle's clock; deadline {deadline_ms:.0} ms: {over_deadline} over it, of {plans}")
+            }
+        }));
         rows.extend(solver_work.map(|SolverWork { plans, median, max }| {
             let plans = counted(plans as u64, "plan");
             ("solver", format!("work median {median:.0}, worst {max:.0} Newton iterations, of {plans}; CPU time not recorded"))
@@ -567,28 +571,15 @@ impl Frames {
 /// When each phase began.
 fn phases(timeline: &PhaseTimeline) -> String {
     let clock = match timeline.source {
-        PhaseSource::Vehicle => "T+",
-        PhaseSource::Telemetry => "the station's clock",
+        PhaseSource::Vehicle => "T+ in s, from the vehicle's frames",
+        PhaseSource::Telemetry => "the station's clock in s, from the ground station's telemetry",
     };
     let spans = &timeline.spans;
     let began = spans.iter().take(PHASES_SHOWN).map(|span| format!("{} {:.2}", span.phase, span.from_s));
     let began = began.collect::<Vec<_>>().join(", ");
     let more = spans.len().saturating_sub(PHASES_SHOWN) as u64 + timeline.further_changes;
     let more = if more > 0 { format!(" and {}", counted(more, "more change")) } else { String::new() };
-    format!("{began}{more} ({clock} in s, from the {})", timeline.source.name())
-}
-
-/// The latency counts from the request of a plan to its use, on the vehicle's clock: of a simulated
-/// flight it is simulated, and says nothing of this machine.
-pub(crate) fn latency_text(times: &PlanningLatency) -> String {
-    format!(
-        "latency median {:.2} ms, p99 {:.2} ms, worst {:.2} ms from request to use on the vehicle's clock; deadline {:.0} ms: {} over it",
-        times.median_s * 1e3,
-        times.p99_s * 1e3,
-        times.max_s * 1e3,
-        times.deadline_s * 1e3,
-        times.over_deadline
-    )
+    format!("{began}{more} ({clock})")
 }
 
 /// How many there are, and which of them lack something.
@@ -612,11 +603,6 @@ fn short(value: &str) -> &str {
     if hash { &value[..SHOWN] } else { value }
 }
 
-/// Rounds away the error of converting degrees to radians and back.
-pub(crate) fn rounded(limit: f64) -> f64 {
-    (limit * 1e6).round() / 1e6
-}
-
 fn or_none(text: &str) -> &str {
     if text.is_empty() { "none" } else { text }
 }
@@ -637,9 +623,6 @@ pub(crate) fn utc(unix_ns: u64) -> String {
         .and_then(|time| time.format(&Rfc3339).ok())
         .unwrap_or_else(|| format!("{unix_ns} ns"))
 }
-
-/// Stands for standard input.
-const STDIN: &str = "-";
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
@@ -684,7 +667,7 @@ impl Args {
 }
 
 fn description(file: &std::path::Path) -> Result<Info, LogError> {
-    if file.as_os_str() == STDIN {
+    if file.as_os_str() == "-" {
         return info_of(&mut FlightLog::read("standard input".to_owned(), std::io::stdin().lock())?);
     }
     // A pipe of the shell, as in `info <(...)`, is open already, and its writer is there.

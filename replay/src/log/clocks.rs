@@ -72,27 +72,22 @@ pub enum Moment {
     Phase(Phase),
 }
 
-/// Why a text is no moment.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7, a phase ({}), or frame:NUMBER",
-    Phase::ALL.map(Phase::name).join(", ")
-)]
-pub struct MomentError {
-    given: String,
-}
-
 impl FromStr for Moment {
-    type Err = MomentError;
+    type Err = String;
 
-    fn from_str(given: &str) -> Result<Self, MomentError> {
+    fn from_str(given: &str) -> Result<Self, String> {
         let number = |text: &str| text.parse().ok().map(Self::Frame);
         let phase = || Phase::ALL.into_iter().find(|phase| phase.name().eq_ignore_ascii_case(given));
         let found = match given.strip_prefix("frame:") {
             Some(text) => number(text),
             None => phase().map(Self::Phase).or_else(|| ClockTime::read(given).map(Self::Time)),
         };
-        found.ok_or_else(|| MomentError { given: given.to_owned() })
+        found.ok_or_else(|| {
+            let phases = Phase::ALL.map(Phase::name).join(", ");
+            format!(
+                "`{given}`: must be a time in seconds, as in T+12.9, boot:19.8 or log:19.7, a phase ({phases}), or frame:NUMBER"
+            )
+        })
     }
 }
 

@@ -155,7 +155,8 @@ impl InFlight {
 /// Separates flights while the records of a log are read.
 #[derive(Debug, Clone, Default)]
 pub struct Flights {
-    found: Vec<LoggedFlight>,
+    /// Every flight so far, in file order.
+    pub(crate) found: Vec<LoggedFlight>,
 }
 
 impl Flights {
@@ -193,11 +194,6 @@ impl Flights {
             }
             _ => {}
         }
-    }
-
-    /// Every flight so far, in file order.
-    pub fn found(&self) -> &[LoggedFlight] {
-        &self.found
     }
 
     /// Where the record ends, for the first flight that is incomplete.

@@ -43,7 +43,7 @@ pub struct Attachment {
 }
 
 /// Comparison of the build that wrote a log with this one.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct BuildComparison {
     /// Whether the log says which build wrote it.
     pub recorded: bool,
@@ -108,12 +108,18 @@ impl Head {
 
     /// Comparison of the build that wrote the log with this one.
     pub fn compare_build(&self) -> BuildComparison {
-        let this = build_info();
-        let facts: std::collections::BTreeSet<&String> = self.build.keys().chain(this.keys()).collect();
-        let differences = facts.into_iter().filter_map(|fact| {
-            let (recorded, this_build) = (self.build.get(fact).cloned(), this.get(fact).cloned());
-            (recorded != this_build).then(|| BuildDifference { fact: fact.clone(), recorded, this_build })
-        });
+        let differences = differing(&self.build, &build_info()).into_iter();
+        let differences =
+            differences.map(|(fact, [recorded, this_build])| BuildDifference { fact, recorded, this_build });
         BuildComparison { recorded: !self.build.is_empty(), differences: differences.collect() }
     }
+}
+
+/// The entries that only one map has, or that have another value there.
+pub(crate) fn differing(
+    one: &BTreeMap<String, String>,
+    other: &BTreeMap<String, String>,
+) -> BTreeMap<String, [Option<String>; 2]> {
+    let both = |name: &String| (name.clone(), [one, other].map(|map| map.get(name).cloned()));
+    one.keys().chain(other.keys()).map(both).filter(|(_, [one, other])| one != other).collect()
 }

@@ -14,9 +14,10 @@ use std::fs::File;
 use std::io::{BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
-pub use clocks::{Clock, ClockTime, Clocks, Jump, Moment, MomentError};
+pub use clocks::{Clock, ClockTime, Clocks, Jump, Moment};
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
 use flights::{InFlight, Sequences};
+pub(crate) use head::differing;
 pub use head::{Attachment, BuildComparison, BuildDifference, Head};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
 use protocol::log::record::{
@@ -26,9 +27,9 @@ use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{RECORD_MAX_BYTES, frame_descriptor, misread_frame};
 pub use recording::{Recording, RecordingError};
-pub(crate) use verdict::frame_of;
-use verdict::{Found, Verdicts, contradiction, received_message};
 pub use verdict::{Verdict, share, worst_first};
+use verdict::{Verdicts, contradiction, received_message};
+pub(crate) use verdict::{frame_of, is_received};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -92,9 +93,12 @@ pub struct FlightLog<R: Read> {
     /// Whether a record was found that only flight logs have.
     recognised: bool,
     first_log_time_ns: Option<u64>,
-    last_log_time_ns: Option<u64>,
-    flights: Flights,
-    clocks: Clocks,
+    /// The latest time of any entry so far, ns since the Unix epoch.
+    pub(crate) last_log_time_ns: Option<u64>,
+    /// The flights so far.
+    pub(crate) flights: Flights,
+    /// How its clocks differ, as far as it was read.
+    pub(crate) clocks: Clocks,
     verdicts: Verdicts,
     order: ComputerOrder,
     in_flight: InFlight,
@@ -206,28 +210,13 @@ impl<R: Read> FlightLog<R> {
         self.reader.is_counted()
     }
 
-    /// The latest time of any entry so far, ns since the Unix epoch.
-    pub fn last_log_time_ns(&self) -> Option<u64> {
-        self.last_log_time_ns
-    }
-
     /// The number of missing records, if all channels so far share one sequence counter.
     pub(crate) fn missing_of_all(&self) -> Option<u32> {
         self.sequences.missing_of_all()
     }
 
-    /// The flights so far.
-    pub fn flights(&self) -> &Flights {
-        &self.flights
-    }
-
-    /// How its clocks differ, as far as it was read.
-    pub fn clocks(&self) -> Clocks {
-        self.clocks
-    }
-
     /// Its landing verdict, recorded or received, as far as it was read.
-    pub(crate) fn verdict(&self) -> Option<Found> {
+    pub(crate) fn verdict(&self) -> Option<Verdict> {
         self.verdicts.found()
     }
 
@@ -315,37 +304,19 @@ const TOPICS_SHOWN: usize = 8;
 pub enum LogError {
     /// The file cannot be read.
     #[error("{name}: cannot be read")]
-    Read {
-        /// The file.
-        name: String,
-        /// Error from the operating system.
-        source: std::io::Error,
-    },
+    Read { name: String, source: std::io::Error },
     /// The file is empty.
     #[error("{name}: is empty; a flight log is an MCAP file")]
-    Empty {
-        /// The file.
-        name: String,
-    },
+    Empty { name: String },
     /// The file is of another kind.
     #[error(
         "{name}: is not a flight log: {}, and an MCAP file begins with 89 4d 43 41 50 30 0d 0a; `ground --replay` shows a .tlog",
         kind_of(found)
     )]
-    NotMcap {
-        /// The file.
-        name: String,
-        /// Its first bytes.
-        found: Vec<u8>,
-    },
+    NotMcap { name: String, found: Vec<u8> },
     /// The file begins like a log, but no message can be read.
     #[error("{name}: nothing could be read: it is damaged before its first message: {damage}")]
-    NothingReadable {
-        /// The file.
-        name: String,
-        /// What is wrong.
-        damage: String,
-    },
+    NothingReadable { name: String, damage: String },
     /// MCAP allows any order; a flight is read from its beginning to its end.
     #[error(
         "{name}: is not in order of time: a record on {topic} comes {back_s:.3} s late, behind one that it belongs before; \
@@ -357,13 +328,7 @@ pub enum LogError {
         "{name}: is an MCAP file written by {:?}, but not a flight log: it has {}, and none of {}, {}, {} or similar topics",
         printable(library.as_bytes()), listed(topics), TOPIC_COMPUTER_FRAME, TOPIC_TELEMETRY, TOPIC_RAW_RX
     )]
-    Foreign {
-        /// The file.
-        name: String,
-        /// The library that wrote it.
-        library: String,
-        topics: Vec<String>,
-    },
+    Foreign { name: String, library: String, topics: Vec<String> },
 }
 
 /// Other files that people have beside their logs, by their first bytes.

@@ -3,7 +3,7 @@
 use std::sync::LazyLock;
 
 use flight::computer::flight_time_s;
-use prost::Message;
+use prost::{Message, Name};
 use prost_reflect::{
     Cardinality, DescriptorPool, DynamicMessage, MessageDescriptor, ReflectMessage as _, Value,
 };
@@ -67,7 +67,7 @@ pub enum Entry {
     /// A frame of the flight computer.
     ComputerFrame(Box<LoggedFrame>),
     /// Solve time of a planning frame.
-    PilotTiming(flight_v1::PilotTiming),
+    PilotTiming(Box<flight_v1::PilotTiming>),
     /// The estimate of the flight computer after a frame.
     Estimate(Box<flight_v1::Estimate>),
     /// The simulated world.
@@ -101,29 +101,18 @@ impl Entry {
             return Self::Other;
         };
         match channel.topic.as_str() {
-            TOPIC_COMPUTER_START => {
-                decoded(channel, "touchdown.computer.v1.ComputerStart", data, Self::ComputerStart)
-            }
+            TOPIC_COMPUTER_START => decoded(channel, data, Self::ComputerStart),
             TOPIC_COMPUTER_FRAME => {
-                decoded_if(!trusted, channel, "touchdown.computer.v1.ComputerFrame", data, |record| {
+                decoded_if(!trusted, channel, &computer_v1::ComputerFrame::full_name(), data, |record| {
                     Self::ComputerFrame(Box::new(LoggedFrame { record: *record, since_release: None }))
                 })
             }
-            TOPIC_PILOT_TIMING => decoded::<flight_v1::PilotTiming>(
-                channel,
-                "touchdown.flight.v1.PilotTiming",
-                data,
-                |timing| Self::PilotTiming(*timing),
-            ),
-            TOPIC_ESTIMATE => decoded(channel, "touchdown.flight.v1.Estimate", data, Self::Estimate),
-            TOPIC_TRUTH_SAMPLE => decoded(channel, "touchdown.flight.v1.TruthSample", data, Self::World),
-            TOPIC_VERDICT => decoded(channel, "touchdown.log.v1.LandingVerdict", data, Self::Verdict),
-            TOPIC_TELEMETRY => decoded(channel, "touchdown.log.v1.Telemetry", data, Self::Telemetry),
-            TOPIC_OPERATOR => {
-                decoded::<v1::OperatorAction>(channel, "touchdown.log.v1.OperatorAction", data, |_| {
-                    Self::Operator
-                })
-            }
+            TOPIC_PILOT_TIMING => decoded(channel, data, Self::PilotTiming),
+            TOPIC_ESTIMATE => decoded(channel, data, Self::Estimate),
+            TOPIC_TRUTH_SAMPLE => decoded(channel, data, Self::World),
+            TOPIC_VERDICT => decoded(channel, data, Self::Verdict),
+            TOPIC_TELEMETRY => decoded(channel, data, Self::Telemetry),
+            TOPIC_OPERATOR => decoded(channel, data, |_: Box<v1::OperatorAction>| Self::Operator),
             TOPIC_EVENTS => decoded_if(false, channel, "foxglove.Log", data, Self::Event),
             TOPIC_RAW_RX | TOPIC_RAW_TX if channel.message_encoding == ENCODING_MAVLINK => Self::RawFrame,
             _ => Self::Other,
@@ -134,19 +123,18 @@ impl Entry {
 /// Records are far smaller. Decoded, one may take many times its bytes.
 pub(crate) const RECORD_MAX_BYTES: usize = 1 << 20;
 
-fn decoded<M: Message + Default>(
+fn decoded<M: Message + Name + Default>(
     channel: &LogChannel,
-    accepted: &str,
     data: &[u8],
     kind: impl FnOnce(Box<M>) -> Entry,
 ) -> Entry {
-    decoded_if(true, channel, accepted, data, kind)
+    decoded_if(true, channel, &M::full_name(), data, kind)
 }
 
 /// Why a frame's bytes cannot be understood exactly; `None` if they can. Where a frame is encoded
 /// again to be compared with its bytes, this is called only if they differ.
 pub(crate) fn misread_frame(data: &[u8]) -> Option<String> {
-    complaint("touchdown.computer.v1.ComputerFrame", data)
+    complaint(&computer_v1::ComputerFrame::full_name(), data)
         .map(|complaint| format!("{TOPIC_COMPUTER_FRAME}: {complaint}"))
 }
 
@@ -167,16 +155,13 @@ fn decoded_if<M: Message + Default>(
             Entry::Other
         };
     }
+    let unreadable = |why: String| Entry::Unreadable { reason: format!("{}: {why}", channel.topic) };
     if data.len() > RECORD_MAX_BYTES {
-        let reason =
-            format!("{}: {} bytes; no record has more than {RECORD_MAX_BYTES}", channel.topic, data.len());
-        return Entry::Unreadable { reason };
+        return unreadable(format!("{} bytes; no record has more than {RECORD_MAX_BYTES}", data.len()));
     }
     let message = match M::decode(data) {
         Ok(message) => message,
-        Err(error) => {
-            return Entry::Unreadable { reason: format!("{}: {error}", channel.topic) };
-        }
+        Err(error) => return unreadable(error.to_string()),
     };
     // The decoder fills missing fields with zeros and skips unknown ones, so encoding again would
     // give different bytes.
@@ -184,7 +169,7 @@ fn decoded_if<M: Message + Default>(
         && message.encode_to_vec() != data
         && let Some(complaint) = complaint(accepted, data)
     {
-        return Entry::Unreadable { reason: format!("{}: {complaint}", channel.topic) };
+        return unreadable(complaint);
     }
     kind(Box::new(message))
 }
@@ -199,7 +184,7 @@ static POOL: LazyLock<DescriptorPool> = LazyLock::new(|| {
 
 /// Describes a frame of the flight computer.
 pub(crate) fn frame_descriptor() -> Option<MessageDescriptor> {
-    POOL.get_message_by_name("touchdown.computer.v1.ComputerFrame")
+    POOL.get_message_by_name(&computer_v1::ComputerFrame::full_name())
 }
 
 /// Why a record cannot be understood exactly: a missing or an unknown field. `None` if it can.

@@ -13,7 +13,7 @@ use protocol::log::{flight_v1, v1};
 
 use crate::controller::LoggedComputer;
 
-use super::{Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError};
+use super::{Clock, Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, Verdict};
 
 /// Most records of one kind: seventeen minutes of frames at 200 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -28,42 +28,23 @@ pub enum RecordingError {
     #[error(
         "{name}: has more than {RECORDS_MAX} {kind}, more than this command holds in memory; no flight is that long"
     )]
-    TooLong {
-        /// The file.
-        name: String,
-        /// The kind of record of which there are too many.
-        kind: &'static str,
-    },
+    TooLong { name: String, kind: &'static str },
     /// The log has no frames to re-execute.
     #[error(
         "{name}: has no frames of a flight computer after its release: {}",
         unreadable.as_deref().unwrap_or("this command needs the log of the vehicle or of the demonstration")
     )]
-    NoFrames {
-        /// The file.
-        name: String,
-        /// Why a record could not be read, if that is the reason.
-        unreadable: Option<String>,
-    },
+    NoFrames { name: String, unreadable: Option<String> },
     /// The first frames are lost.
     #[error(
         "{name}: begins with frame {first} of the flight computer, and the frames before it are lost: what the computer remembered there is unknown"
     )]
-    BeginningLost {
-        /// The file.
-        name: String,
-        /// The first frame in the log.
-        first: u64,
-    },
+    BeginningLost { name: String, first: u64 },
     /// The log holds several flights.
     #[error(
         "{name}: holds {flights} flights, and this command takes one; `replay verify` reports on each of them"
     )]
-    SeveralFlights {
-        /// The file.
-        name: String,
-        flights: usize,
-    },
+    SeveralFlights { name: String, flights: usize },
     #[error(
         "{name}: has no frames of a flight computer with its sensors and estimates ({found}). A fit needs the vehicle's own log: at \
          the rates of telemetry neither thrust nor delays can be found"
@@ -73,17 +54,10 @@ pub enum RecordingError {
     Frame { name: String, source: RecordError },
     /// The log has no profile to build the controller from.
     #[error("{name}: has no attachment profile.toml, and without the profile the controller cannot be built")]
-    NoProfile {
-        /// The file.
-        name: String,
-    },
+    NoProfile { name: String },
     /// This build cannot use the profile.
     #[error("{name}: its profile cannot be used by this build: {reason}")]
-    ProfileUnusable {
-        /// The file.
-        name: String,
-        reason: String,
-    },
+    ProfileUnusable { name: String, reason: String },
 }
 
 /// A flight, read from its log.
@@ -120,9 +94,7 @@ pub struct Recording {
     /// Events, with log time in seconds after the first record.
     pub events: Vec<(f64, EventRecord)>,
     /// The landing verdict, recorded or received.
-    pub verdict: Option<v1::LandingVerdict>,
-    /// A ground station received the verdict: its time counts from power-up.
-    pub verdict_received: bool,
+    pub verdict: Option<Verdict>,
     /// How the clocks of the log differ.
     pub clocks: Clocks,
     /// When the log ends, ns of Unix time.
@@ -170,7 +142,7 @@ impl Recording {
         let (mut frame_order, mut frames_lost) = (FrameOrder::default(), None);
         while let Some(stamped) = log.next_entry()? {
             match stamped.entry {
-                Entry::PilotTiming(timing) => recording.timings.push(timing),
+                Entry::PilotTiming(timing) => recording.timings.push(*timing),
                 Entry::World(sample) => recording.world.push(*sample),
                 Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
                 Entry::Event(event) => {
@@ -220,15 +192,12 @@ impl Recording {
             }
             recording.check_length()?;
         }
-        log.flights().refuse_several(&recording.name)?;
-        recording.cut = log.flights().cut();
-        recording.clocks = log.clocks();
-        if let Some(found) = log.verdict() {
-            recording.verdict_received = found.is_received;
-            recording.verdict = Some(found.verdict);
-        }
+        log.flights.refuse_several(&recording.name)?;
+        recording.cut = log.flights.cut();
+        recording.clocks = log.clocks;
+        recording.verdict = log.verdict();
         recording.head = log.head().clone();
-        recording.last_ns = log.last_log_time_ns();
+        recording.last_ns = log.last_log_time_ns;
         recording.damage = log.damage().map(ToString::to_string);
         recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
         Ok(recording)
@@ -246,12 +215,12 @@ impl Recording {
 
     /// Time of contact on the clock of its frames, or of its telemetry, s.
     pub fn contact_s(&self) -> Option<f64> {
-        let contact_s = self.verdict.as_ref()?.time_s;
-        if !self.verdict_received {
-            return Some(contact_s);
+        let Verdict { time_s, clock, .. } = self.verdict.as_ref()?;
+        if *clock == Clock::Flight {
+            return Some(*time_s);
         }
         let Clocks { boot_zero_s, telemetry_zero_s, .. } = self.clocks;
-        Some(contact_s + boot_zero_s.unwrap_or(0.0) - telemetry_zero_s.unwrap_or(0.0))
+        Some(time_s + boot_zero_s.unwrap_or(0.0) - telemetry_zero_s.unwrap_or(0.0))
     }
 
     /// The start record and all frames.

@@ -76,12 +76,6 @@ impl Verdict {
         self.envelope.iter().chain(&self.borne)
     }
 
-    /// The verdict that was found in a log.
-    pub(crate) fn found(found: &Found) -> Self {
-        let clock = if found.is_received { Clock::Boot } else { Clock::Flight };
-        Self { clock, ..Self::of(&found.verdict) }
-    }
-
     /// Its time of contact with its clock.
     pub fn contact(&self) -> ClockTime {
         ClockTime { clock: self.clock, time_s: self.time_s }
@@ -91,7 +85,7 @@ impl Verdict {
 /// Collects the verdict while a log is read.
 #[derive(Debug, Default)]
 pub(crate) struct Verdicts {
-    recorded: Option<v1::LandingVerdict>,
+    recorded: Option<Verdict>,
     has_frames: bool,
     /// Messages received from the vehicle: its limits, its verdict, and whether it had aborted or
     /// was under its parachute.
@@ -101,18 +95,11 @@ pub(crate) struct Verdicts {
     under_parachute: bool,
 }
 
-/// A verdict of a log.
-pub(crate) struct Found {
-    pub(crate) verdict: v1::LandingVerdict,
-    /// Its time counts from power-up, because it was received by a ground station.
-    pub(crate) is_received: bool,
-}
-
 impl Verdicts {
     /// Notes a record, and the message of the vehicle in it ([`received_message`]).
     pub(crate) fn note(&mut self, stamped: &StampedEntry, message: Option<&MavMessage>) {
         match &stamped.entry {
-            Entry::Verdict(verdict) => self.recorded = Some((**verdict).clone()),
+            Entry::Verdict(verdict) => self.recorded = Some(Verdict::of(verdict)),
             Entry::ComputerFrame(_) => self.has_frames = true,
             Entry::RawFrame if !self.has_frames => self.note_message(message),
             _ => {}
@@ -134,14 +121,11 @@ impl Verdicts {
     }
 
     /// The vehicle's own verdict; without its frames, the one that was received.
-    pub(crate) fn found(&self) -> Option<Found> {
-        let received =
-            self.received().filter(|_| !self.has_frames).map(|verdict| Found { verdict, is_received: true });
-        received.or_else(|| Some(Found { verdict: self.recorded.clone()?, is_received: false }))
+    pub(crate) fn found(&self) -> Option<Verdict> {
+        self.received().filter(|_| !self.has_frames).or_else(|| self.recorded.clone())
     }
 
-    /// The verdict that was received, as a record; its time counts from power-up.
-    fn received(&self) -> Option<v1::LandingVerdict> {
+    fn received(&self) -> Option<Verdict> {
         let verdict = self.received.as_ref()?;
         let reported = |limit: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
             self.limits.as_ref().map_or(UNREPORTED, |limits| f64::from(limit(limits)))
@@ -166,7 +150,7 @@ impl Verdicts {
         for (place, limit) in envelope.results.iter_mut().enumerate() {
             limit.passed = verdict.limits_violated.bits() & (1 << place) == 0;
         }
-        let landing = v1::Landing {
+        let landing = Landing {
             stands: verdict.landing.contains(TdLanding::TD_LANDING_STANDS),
             upright: verdict.landing.contains(TdLanding::TD_LANDING_UPRIGHT),
             envelope: verdict.landing.contains(TdLanding::TD_LANDING_ENVELOPE),
@@ -174,13 +158,15 @@ impl Verdicts {
         };
         let broken = envelope.worst().map(|limit| limit.name);
         let failure = if self.under_parachute { Some(UNDER_PARACHUTE) } else { broken };
-        let ending = FlightEnding { aborted: self.aborted, landing: landing_of(landing), failure };
-        Some(v1::LandingVerdict {
-            time_s: f64::from(verdict.contact_ms) / 1e3,
-            ending: Some(ending.to_string()),
+        let ending = FlightEnding { aborted: self.aborted, landing, failure };
+        Some(Verdict {
             landing,
+            ending: ending.to_string(),
+            time_s: f64::from(verdict.contact_ms) / 1e3,
+            clock: Clock::Boot,
             envelope: limits_to_log(&envelope),
-            ..v1::LandingVerdict::default()
+            borne: Vec::new(),
+            table_2: Vec::new(),
         })
     }
 }
@@ -222,16 +208,13 @@ pub(super) fn contradiction(verdict: &v1::LandingVerdict) -> Option<String> {
 
 /// The message of a raw frame that a ground station has received.
 pub(crate) fn received_message(channel: Option<&LogChannel>, stamped: &StampedEntry) -> Option<MavMessage> {
-    let is_received = stamped.entry == Entry::RawFrame && received_by_ground(channel);
+    let is_received = stamped.entry == Entry::RawFrame && channel.is_some_and(|it| is_received(it, "ground"));
     if is_received { frame_of(&stamped.data)?.decode().ok() } else { None }
 }
 
-/// Whether a ground station received the frames of a channel.
-fn received_by_ground(channel: Option<&LogChannel>) -> bool {
-    channel.is_some_and(|channel| {
-        channel.topic == TOPIC_RAW_RX
-            && channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "ground")
-    })
+/// Whether an endpoint, `ground` or `vehicle`, received the frames of a channel.
+pub(crate) fn is_received(channel: &LogChannel, by: &str) -> bool {
+    channel.topic == TOPIC_RAW_RX && channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == by)
 }
 
 /// A raw frame, if its checksum is right and the dialect has its message.

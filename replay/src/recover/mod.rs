@@ -11,15 +11,14 @@ mod write;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
 use mcap::records::Metadata;
 use protocol::log::record::{METADATA_RECOVERY, RECOVERY_FAULT_ENTRY};
-use protocol::program::Exit;
 use scan::{LostStretch, Records};
 use serde::Serialize;
+pub use write::Recovered;
 use write::Rescue;
 
-use crate::cli::{Answer, give};
+use crate::cli::Answer;
 use crate::log::LogError;
 use crate::output::WriteError;
 use crate::print::counted;
@@ -32,12 +31,7 @@ pub enum RecoverError {
     Log(#[from] LogError),
     /// No message could be recovered.
     #[error("{name}: no message can be recovered{}", reason.as_ref().map(|why| format!(": {why}")).unwrap_or_default())]
-    Nothing {
-        /// The file.
-        name: String,
-        /// What is wrong with it first.
-        reason: Option<String>,
-    },
+    Nothing { name: String, reason: Option<String> },
     #[error(transparent)]
     Write(#[from] WriteError),
 }
@@ -61,26 +55,14 @@ pub struct Recovery {
     pub input: String,
     /// The recovered one.
     pub output: PathBuf,
-    /// Messages recovered.
-    pub messages: u64,
-    /// Chunks recovered.
-    pub chunks: u64,
-    /// Attachments and metadata records recovered.
-    pub records_about: u64,
+    #[serde(flatten)]
+    pub recovered: Recovered,
     /// From the first recovered message to the last, s.
     pub kept_s: Option<f64>,
     /// What was lost.
     pub lost: Vec<Lost>,
     /// Number of messages by the summary; `None` without an intact one.
     pub messages_counted: Option<u64>,
-    /// Messages of a channel without a description.
-    pub undecodable: u64,
-    /// Messages recovered from between the chunks.
-    pub beside_chunks: u64,
-    /// Some message comes later than one that belongs behind it.
-    pub out_of_order: bool,
-    /// How the recovered log is in order; `None` if it was, or if no order was found.
-    pub put_in_order: Option<&'static str>,
     /// The summary is there and its checksum is right; no message is lost without it.
     pub summary_is_intact: bool,
     /// Whether the log has its end mark, so nothing is missing at the end.
@@ -104,6 +86,7 @@ impl Recovery {
 
     /// The damage of the log, also stored in the recovered one; `None` if it was intact.
     pub fn fault(&self) -> Option<String> {
+        let Recovered { messages, undecodable, beside_chunks, .. } = self.recovered;
         let mut faults = Vec::new();
         faults.extend(self.lost.first().map(|lost| {
             let bytes: u64 = self.lost.iter().map(|lost| lost.bytes).sum();
@@ -113,22 +96,23 @@ impl Recovery {
                 lost.from_byte
             )
         }));
-        let counted = self.messages_counted.filter(|counted| *counted != self.messages);
-        faults.extend(counted.map(|counted| {
-            format!("its summary counts {counted} messages, and {} are there", self.messages)
-        }));
-        if self.undecodable > 0 {
-            faults.push(format!("{} messages of an unknown channel were dropped", self.undecodable));
+        let counted = self.messages_counted.filter(|counted| *counted != messages);
+        faults.extend(
+            counted.map(|counted| format!("its summary counts {counted} messages, and {messages} are there")),
+        );
+        if undecodable > 0 {
+            faults.push(format!("{undecodable} messages of an unknown channel were dropped"));
         }
-        if self.beside_chunks > 0 {
-            let beside = self.beside_chunks;
+        if beside_chunks > 0 {
             faults.push(format!(
-                "{beside} messages stood beside the chunks, which no checksum protects; they are kept"
+                "{beside_chunks} messages stood beside the chunks, which no checksum protects; they are kept"
             ));
         }
-        if self.out_of_order {
-            let order =
-                self.put_in_order.unwrap_or("neither its times nor the numbers of its frames give one");
+        if self.recovered.out_of_order {
+            let order = self
+                .recovered
+                .put_in_order
+                .unwrap_or("neither its times nor the numbers of its frames give one");
             faults.push(format!("it was not in order of time: {order}"));
         }
         if self.ended && !self.summary_is_intact {
@@ -166,16 +150,10 @@ pub fn recover(input: &Path, output: &Path) -> Result<Recovery, RecoverError> {
     let mut recovery = Recovery {
         input,
         output: PathBuf::new(),
-        messages: recovered.messages,
-        chunks: recovered.chunks,
-        records_about: recovered.records_about,
+        recovered,
         kept_s: Some(since_s(last_ns)),
         lost: contents.lost.iter().map(lost).collect(),
         messages_counted: contents.summary.statistics.as_ref().map(|statistics| statistics.message_count),
-        undecodable: recovered.undecodable,
-        beside_chunks: recovered.beside_chunks,
-        out_of_order: recovered.out_of_order,
-        put_in_order: recovered.put_in_order,
         summary_is_intact: contents.summary.is_intact,
         ended: contents.ended,
     };
@@ -189,9 +167,9 @@ impl Answer for Recovery {
         let mut lines = vec![format!(
             "{}: kept {} in {}{kept_s}, {} about the log; written to {}",
             self.input,
-            counted(self.messages, "message"),
-            counted(self.chunks, "chunk"),
-            counted(self.records_about, "record"),
+            counted(self.recovered.messages, "message"),
+            counted(self.recovered.chunks, "chunk"),
+            counted(self.recovered.records_about, "record"),
             self.output.display()
         )];
         lines.extend(self.lost.iter().map(|Lost { from_byte, bytes, span_s, reason }| {
@@ -206,22 +184,5 @@ impl Answer for Recovery {
             Some(fault) => format!("the log was DAMAGED: {fault}; the recovered log says so, too"),
         });
         lines
-    }
-}
-
-#[derive(Debug, clap::Args)]
-pub(crate) struct Args {
-    /// The damaged log.
-    file: PathBuf,
-    /// The log to write.
-    output: PathBuf,
-    /// Answer in JSON.
-    #[arg(long)]
-    json: bool,
-}
-
-impl Args {
-    pub(crate) fn run(self) -> Result<Exit> {
-        give(&recover(&self.file, &self.output)?, self.json)
     }
 }

@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use mcap::records::{MessageHeader, Metadata, Record, op};
+use mcap::records::{Channel, MessageHeader, Metadata, Record, op};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::reader::{RecordError, parse_record, records_of_chunk};
 use protocol::log::record::{TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START};
+use serde::Serialize;
 
 use super::RecoverError;
 use super::scan::{Contents, Records};
@@ -44,19 +45,22 @@ struct Held {
 }
 
 /// Counts of what was recovered.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Recovered {
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Recovered {
+    #[serde(skip)]
     pub(crate) span_ns: Option<(u64, u64)>,
-    pub(crate) messages: u64,
-    pub(crate) chunks: u64,
-    pub(crate) records_about: u64,
+    pub messages: u64,
+    pub chunks: u64,
+    /// Attachments and metadata records.
+    pub records_about: u64,
     /// Messages of a channel without a description.
-    pub(crate) undecodable: u64,
-    pub(crate) beside_chunks: u64,
+    pub undecodable: u64,
+    /// Messages from between the chunks.
+    pub beside_chunks: u64,
     /// Some message comes later than one that belongs behind it.
-    pub(crate) out_of_order: bool,
-    /// How an order was found for them, as text.
-    pub(crate) put_in_order: Option<&'static str>,
+    pub out_of_order: bool,
+    /// How the recovered log is in order; `None` if it was, or if no order was found.
+    pub put_in_order: Option<&'static str>,
 }
 
 impl<'a> Rescue<'a> {
@@ -135,7 +139,7 @@ impl<'a> Rescue<'a> {
         self.recovered.put_in_order = words;
         let (mut last_ns, mut before_ns) = (0, None);
         for Held { header, data, .. } in order {
-            let mut header = header.clone();
+            let mut header = *header;
             if words.is_some() {
                 // Records of one time stay so.
                 let same = before_ns.replace(header.log_time) == Some(header.log_time);
@@ -169,13 +173,7 @@ impl<'a> Rescue<'a> {
             Record::Channel(channel) => {
                 // Schema 0 means no schema.
                 let schema = self.schemas.get(&channel.schema_id).copied().unwrap_or(0);
-                let id = self.writer.add_channel(
-                    schema,
-                    &channel.topic,
-                    &channel.message_encoding,
-                    &channel.metadata,
-                )?;
-                self.channels.insert(channel.id, (id, channel.topic));
+                self.add_channel(schema, &channel)?;
             }
             Record::Message { header, data } => self.message(header, &data)?,
             Record::Metadata(metadata) => {
@@ -232,23 +230,23 @@ impl<'a> Rescue<'a> {
             Some((schema, data)) => self.writer.add_schema(&schema.name, &schema.encoding, data)?,
             None => 0,
         };
-        let new =
-            self.writer.add_channel(schema, &channel.topic, &channel.message_encoding, &channel.metadata)?;
-        self.channels.insert(id, (new, channel.topic.clone()));
+        self.add_channel(schema, channel)?;
         Ok(true)
     }
 
-    /// Completes the log with what it is.
-    pub(crate) fn finish(self, about: &Metadata) -> Result<PathBuf, WriteError> {
-        let path = self.path.clone();
-        let file = self.close(about).map_err(|error| WriteError::at(&path)(std::io::Error::other(error)))?;
-        file.commit()
+    fn add_channel(&mut self, schema: u16, channel: &Channel) -> mcap::McapResult<()> {
+        let Channel { id, topic, message_encoding, metadata, .. } = channel;
+        let new = self.writer.add_channel(schema, topic, message_encoding, metadata)?;
+        self.channels.insert(*id, (new, topic.clone()));
+        Ok(())
     }
 
-    fn close(mut self, about: &Metadata) -> mcap::McapResult<NewFile> {
-        self.writer.write_metadata(about)?;
-        self.writer.finish()?;
-        Ok(self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error)?)
+    /// Completes the log with what it is.
+    pub(crate) fn finish(mut self, about: &Metadata) -> Result<PathBuf, WriteError> {
+        let ended = self.writer.write_metadata(about).and_then(|()| self.writer.finish());
+        ended.map_err(|error| self.failed(error))?;
+        let file = self.writer.into_inner().into_inner().map_err(std::io::IntoInnerError::into_error);
+        file.map_err(WriteError::at(&self.path))?.commit()
     }
 
     fn failed(&self, error: mcap::McapError) -> WriteError {

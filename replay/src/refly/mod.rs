@@ -29,7 +29,7 @@ use flight::rules::phase::Phase;
 use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
-use protocol::log::v1::{self, LimitResult};
+use protocol::log::v1::LimitResult;
 use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::program::Exit;
 use serde::Serialize;
@@ -38,12 +38,12 @@ use sim::wire::record;
 
 pub use self::others::{OtherFlights, other_flights};
 use self::rerun::Rerun;
-use crate::cli::{Answer, give, warn_of_what_is_missing};
-use crate::controller::{AgainError, LoggedComputer, SETTINGS_IN_FLIGHT, phase_name};
+use crate::cli::{Answer, WithSettings, give};
+use crate::controller::{AgainError, SETTINGS_IN_FLIGHT, phase_name, refuse};
 use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share};
 use crate::output::{NewFile, WriteError};
 use crate::print::{counted, verdict_table};
-use crate::settings::{Setting, mission_with, truth_with};
+use crate::settings::{Schedule, Setting, mission_with, truth_with};
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartState {
@@ -137,8 +137,6 @@ pub struct ReflownFlight {
     pub records: Vec<(f64, Record)>,
     /// The facts of its log.
     pub run: BTreeMap<String, String>,
-    /// The landing verdict; `None` if it did not come down.
-    pub verdict: Option<v1::LandingVerdict>,
 }
 
 /// Flies a recorded flight again.
@@ -189,10 +187,9 @@ pub fn refly_flight(
     rerun = rerun.fly_before(u64::MAX);
 
     let verdict = record::verdict(&rerun.flight);
+    let (recorded, reflown) = (recording.verdict.clone(), verdict.as_ref().map(Verdict::of));
     let end_s = rerun.flight.frame() as f64 * FRAME_S;
-    let last = verdict.clone().map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict))));
-    rerun.records.extend(last);
-    let [recorded, reflown] = [&recording.verdict, &verdict].map(|verdict| verdict.as_ref().map(Verdict::of));
+    rerun.records.extend(verdict.map(|verdict| (end_s, Record::LandingVerdict(Box::new(verdict)))));
     let landed = |verdict: &Option<Verdict>| verdict.as_ref().map(|verdict| verdict.landing.stands);
     let listed = |settings: &[Setting]| settings.iter().map(ToString::to_string).collect();
     let changes = ReflyOptions { start: None, ..options.clone() } != ReflyOptions::default();
@@ -218,7 +215,7 @@ pub fn refly_flight(
         others: None,
     };
     let run = run_facts(recording, &report, &in_flight, &rerun);
-    Ok((report, ReflownFlight { records: rerun.records, run, verdict }))
+    Ok((report, ReflownFlight { records: rerun.records, run }))
 }
 
 /// How the frames before the start compare with the record.
@@ -282,7 +279,7 @@ fn change(
     rerun: &mut Rerun,
 ) -> Result<(), AgainError> {
     let toml = recording.profile_toml()?;
-    rerun.schedule = Some(LoggedComputer::schedule(toml, recording.recorded_frames()?.0, in_flight)?);
+    rerun.schedule = Some(Schedule::of(toml, recording.recorded_frames()?.0, in_flight)?);
     let (of_truth, of_mission): (Vec<Setting>, Vec<Setting>) =
         options.plant_settings.iter().cloned().partition(|setting| setting.path.starts_with("truth."));
     let lasting = options.settings.iter().filter(|setting| setting.at_s.is_none());
@@ -301,34 +298,24 @@ fn change(
 /// The plant takes settings of the airframe and of the draw, from the beginning; the controller
 /// takes all but those of the draw and of its estimator.
 fn refuse_misplaced(options: &ReflyOptions) -> Result<(), AgainError> {
-    type IsWrong = fn(&Setting) -> bool;
-    let refused: [(&[Setting], IsWrong, &str); 4] = [
-        (
-            &options.plant_settings,
-            |setting| setting.at_s.is_some(),
-            "the plant's settings hold from the beginning; only the controller's can change in flight",
-        ),
-        (
-            &options.plant_settings,
-            |setting| !(setting.path.starts_with("truth.") || setting.path.starts_with("airframe")),
-            "the plant has airframe.* and truth.*; everything else is the controller's (--set)",
-        ),
-        (
-            &options.settings,
-            |setting| setting.path.starts_with("truth."),
-            "the random draw belongs to the plant alone (--plant)",
-        ),
-        (
-            &options.settings,
-            |setting| setting.path.starts_with("estimator."),
-            "the estimator is set up at apogee; evaluate takes it",
-        ),
-    ];
-    let mut misplaced = refused.into_iter().filter_map(|(settings, is_wrong, belongs)| {
-        let setting = settings.iter().find(|setting| is_wrong(setting))?.to_string();
-        Some(AgainError::Refused { of: setting, reason: belongs.to_owned() })
-    });
-    misplaced.next().map_or(Ok(()), Err)
+    refuse(&options.plant_settings, |Setting { path, at_s, .. }| {
+        let why = if at_s.is_some() {
+            "the plant's settings hold from the beginning; only the controller's can change in flight"
+        } else if !(path.starts_with("truth.") || path.starts_with("airframe")) {
+            "the plant has airframe.* and truth.*; everything else is the controller's (--set)"
+        } else {
+            return None;
+        };
+        Some(why.to_owned())
+    })?;
+    refuse(&options.settings, |Setting { path, .. }| {
+        let why = match path.split_once('.')?.0 {
+            "truth" => "the random draw belongs to the plant alone (--plant)",
+            "estimator" => "the estimator is set up at apogee; evaluate takes it",
+            _ => return None,
+        };
+        Some(why.to_owned())
+    })
 }
 
 /// The index of the frame to start with. For a phase it is the frame after the one that entered it,
@@ -402,9 +389,21 @@ pub fn write_log(
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
     };
+    write_records(output, &header, &flight.records)
+}
+
+/// Writes records with their times since the start, s, as a log.
+///
+/// # Errors
+/// The file cannot be created or written.
+pub(crate) fn write_records(
+    output: &Path,
+    header: &LogHeader,
+    records: &[(f64, Record)],
+) -> Result<PathBuf, WriteError> {
     NewFile::create(output)?.fill(|file| {
-        let mut log = LogWriter::new(BufWriter::new(file), &header).map_err(io::Error::other)?;
-        for (time_s, record) in &flight.records {
+        let mut log = LogWriter::new(BufWriter::new(file), header).map_err(io::Error::other)?;
+        for (time_s, record) in records {
             log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
         }
         log.finish().map_err(io::Error::other)?.flush()
@@ -494,13 +493,8 @@ impl Answer for ReflyReport {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
-    /// The log, an MCAP file.
-    file: PathBuf,
-    /// Another setting, PATH=VALUE or PATH=VALUE@S.
-    ///
-    /// With @6.5 it applies from that vehicle time on, s. May be given more than once.
-    #[arg(long = "set", value_name = "SETTING")]
-    settings: Vec<Setting>,
+    #[command(flatten)]
+    flight: WithSettings,
     /// Another setting of the plant alone.
     ///
     /// As in truth.impulse_scale=0.97. The controller does not know about it. Also
@@ -533,18 +527,14 @@ pub(crate) struct Args {
     /// Write the flight as a new log.
     #[arg(long, alias = "log", value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Answer in JSON.
-    #[arg(long)]
-    json: bool,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
-        let recording = Recording::open(&self.file)?;
-        warn_of_what_is_missing(&recording);
+        let recording = self.flight.recording()?;
         let options = ReflyOptions {
             start: self.at,
-            settings: self.settings,
+            settings: self.flight.settings,
             plant_settings: self.plant,
             faults: FaultChanges { with: self.faults, without: self.without_fault },
         };
@@ -554,6 +544,6 @@ impl Args {
         if let Some(path) = &self.out {
             write_log(path, &recording, &flight)?;
         }
-        give(&report, self.json)
+        give(&report, self.flight.json)
     }
 }

@@ -3,7 +3,6 @@
 use avionics::log::frame::accepts_abort;
 use avionics::log::logged::{calibration_from_log, state_from_log};
 use flight::computer::FRAME_S;
-use flight::vehicle::mission::Mission;
 use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
 use protocol::log::record::Record;
 use sim::fault::{Breakage, FaultError, TimedFault};
@@ -13,7 +12,7 @@ use sim::sortie::Sortie;
 use sim::wire::record::{self as sortie_log, LastFrame};
 
 use super::FaultChanges;
-use crate::controller::{AgainError, LoggedComputer};
+use crate::controller::AgainError;
 use crate::log::{Head, Recording};
 use crate::settings::Schedule;
 
@@ -26,7 +25,7 @@ pub(super) struct Rerun {
     pub(super) number: u64,
     pub(super) flight: Sortie,
     /// Changes of the mission that are still to come.
-    pub(super) schedule: Option<Schedule<Mission>>,
+    pub(super) schedule: Option<Schedule>,
     /// The frames in which the crew aborted.
     aborts: Vec<u64>,
     last: LastFrame,
@@ -69,7 +68,7 @@ impl Rerun {
         let (time_s, phase) = (number as f64 * FRAME_S, self.flight.computer().mode().phase);
         // The change is made before the frame in whose time it falls, as in a recorded flight.
         if let Some(mission) = self.schedule.as_mut().and_then(|schedule| schedule.due(time_s)) {
-            self.flight.reconfigure(mission);
+            self.flight.reconfigure(&mission);
         }
         if self.aborts.binary_search(&number).is_ok() {
             self.flight.abort();
@@ -127,7 +126,7 @@ pub(crate) fn drawn_from(
     let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
     let faults: Result<Vec<TimedFault>, FaultError> = faults.map(str::parse).collect();
     let recipe = Recipe {
-        mission: LoggedComputer::schedule(toml, start, &[])?.base().clone(),
+        mission: Schedule::of(toml, start, &[])?.base,
         mission_toml: toml.to_owned(),
         dispersion,
         dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),

@@ -115,7 +115,7 @@ impl Flight {
         decisions.retain(|_| again.is_ok());
         let pilot = again.as_ref().ok().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
-        info.set_findings(findings::facts(&recording, info.verdict.as_ref(), found));
+        info.set_findings(findings::facts(&recording, found));
         let (source, track) = track(&recording, &decisions);
         let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         let ignited = pilot.as_ref().and_then(Pilot::ignited_at_s);

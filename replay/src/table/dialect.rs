@@ -23,7 +23,9 @@ pub(super) struct Message {
 #[derive(Debug)]
 pub(super) struct Field {
     pub(super) name: String,
-    pub(super) wire: Wire,
+    wire: Wire,
+    /// Size of an element, bytes.
+    size: usize,
     /// Number of elements; `None` for a single value.
     pub(super) count: Option<usize>,
     extension: bool,
@@ -33,62 +35,50 @@ pub(super) struct Field {
 
 /// A type on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Wire {
-    Unsigned(usize),
-    Signed(usize),
+enum Wire {
+    Unsigned,
+    Signed,
     Float,
-    Double,
     Char,
 }
 
 impl Wire {
-    fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "uint8_t" | "uint8_t_mavlink_version" => Self::Unsigned(1),
-            "uint16_t" => Self::Unsigned(2),
-            "uint32_t" => Self::Unsigned(4),
-            "uint64_t" => Self::Unsigned(8),
-            "int8_t" => Self::Signed(1),
-            "int16_t" => Self::Signed(2),
-            "int32_t" => Self::Signed(4),
-            "int64_t" => Self::Signed(8),
-            "float" => Self::Float,
-            "double" => Self::Double,
-            "char" => Self::Char,
-            _ => return None,
+    /// The type of a name, and the size of its values, bytes.
+    fn named(name: &str) -> Option<(Self, usize)> {
+        Some(match name.trim_end_matches("_mavlink_version") {
+            "float" => (Self::Float, 4),
+            "double" => (Self::Float, 8),
+            "char" => (Self::Char, 1),
+            whole => {
+                let unsigned = whole.strip_prefix('u');
+                let bits = unsigned.unwrap_or(whole).strip_prefix("int")?.strip_suffix("_t")?;
+                let wire = if unsigned.is_some() { Self::Unsigned } else { Self::Signed };
+                (wire, bits.parse::<usize>().ok()? / 8)
+            }
         })
     }
 
-    pub(super) fn size(self) -> usize {
+    fn kind(self) -> Kind {
         match self {
-            Self::Unsigned(size) | Self::Signed(size) => size,
-            Self::Float => 4,
-            Self::Double => 8,
-            Self::Char => 1,
-        }
-    }
-
-    pub(super) fn kind(self) -> Kind {
-        match self {
-            Self::Unsigned(_) | Self::Signed(_) => Kind::Integer,
-            Self::Float | Self::Double => Kind::Float,
+            Self::Unsigned | Self::Signed => Kind::Integer,
+            Self::Float => Kind::Float,
             Self::Char => Kind::Text,
         }
     }
 
     /// The value in these bytes, the least significant first; whole numbers of 64 bits wrap around.
-    pub(super) fn value(self, bytes: &[u8]) -> Cell {
+    fn value(self, bytes: &[u8]) -> Cell {
         let mut wide = [0; 8];
         wide.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
         let whole = u64::from_le_bytes(wide);
         match self {
-            Self::Unsigned(_) => Cell::Integer(whole.cast_signed()),
-            Self::Signed(size) => {
-                let unused = 64 - 8 * size;
+            Self::Unsigned => Cell::Integer(whole.cast_signed()),
+            Self::Signed => {
+                let unused = 64 - 8 * bytes.len().clamp(1, 8);
                 Cell::Integer((whole << unused).cast_signed() >> unused)
             }
-            Self::Float => Cell::Float(f64::from(f32::from_bits(whole as u32))),
-            Self::Double => Cell::Float(f64::from_bits(whole)),
+            Self::Float if bytes.len() == 4 => Cell::Float(f64::from(f32::from_bits(whole as u32))),
+            Self::Float => Cell::Float(f64::from_bits(whole)),
             Self::Char => {
                 let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
                 Cell::Text(String::from_utf8_lossy(&bytes[..end]).into_owned())
@@ -121,7 +111,8 @@ fn field(node: Node<'_, '_>, extension: bool) -> Option<Field> {
         Some((wire, rest)) => (wire, Some(rest.trim_end_matches(']').parse().ok()?)),
     };
     let name = node.attribute("name")?.to_owned();
-    Some(Field { name, wire: Wire::named(wire)?, count, extension, at: 0 })
+    let (wire, size) = Wire::named(wire)?;
+    Some(Field { name, wire, size, count, extension, at: 0 })
 }
 
 /// On the wire the largest types come first, and extensions last, in their own order.
@@ -129,12 +120,12 @@ fn place(fields: &mut [Field]) {
     let mut order: Vec<usize> = (0..fields.len()).collect();
     order.sort_by_key(|k| {
         let field = &fields[*k];
-        (field.extension, if field.extension { 0 } else { 8 - field.wire.size() })
+        (field.extension, if field.extension { 0 } else { 8 - field.size })
     });
     let mut at = 0;
     for k in order {
         fields[k].at = at;
-        at += fields[k].wire.size() * fields[k].count.unwrap_or(1);
+        at += fields[k].size * fields[k].count.unwrap_or(1);
     }
 }
 
@@ -176,7 +167,7 @@ pub(super) fn cells_of_frame(frame: &Frame, [recorded_by, direction, link]: [&st
     let mut cells = vec![text(recorded_by), text(direction), text(link), sequence];
     let payload = frame.padded_payload();
     for field in MESSAGES.get(&frame.message_id()).map(|message| &message.fields).into_iter().flatten() {
-        let size = field.wire.size();
+        let size = field.size;
         let bytes = |at: usize, length: usize| payload.get(at..at + length).unwrap_or_default();
         match field.count {
             Some(count) if field.wire == Wire::Char => cells.push(field.wire.value(bytes(field.at, count))),
@@ -205,7 +196,7 @@ mod tests {
         for (id, message) in &*MESSAGES {
             let Some(name) = protocol::dialect::message_name(*id) else { continue };
             assert_eq!(message.name, name);
-            let end = |field: &Field| field.at + field.wire.size() * field.count.unwrap_or(1);
+            let end = |field: &Field| field.at + field.size * field.count.unwrap_or(1);
             assert!(message.fields.iter().map(end).max().is_some_and(|end| end <= 255), "{name}");
         }
     }

@@ -11,7 +11,6 @@
 mod dialect;
 
 use std::collections::BTreeMap;
-use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::io::Read;
 
 use flight::rules::verdict::Landing;
@@ -193,13 +192,12 @@ pub struct Row {
 /// Reads a log's rows in file order.
 #[derive(Default)]
 pub struct TableReader {
-    shapes: Vec<TableShape>,
+    /// Every table seen so far.
+    pub shapes: Vec<TableShape>,
     /// By channel; `None` for records that are not ours.
     channels: BTreeMap<u16, Option<OpenTable>>,
     /// The tables of MAVLink messages.
     messages: BTreeMap<(Address, u32), usize>,
-    limits: Option<usize>,
-    events: Option<usize>,
 }
 
 /// The known structure of a channel's records.
@@ -210,16 +208,6 @@ struct OpenTable {
 }
 
 impl TableReader {
-    /// A reader before its first record.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Every table seen so far.
-    pub fn shapes(&self) -> &[TableShape] {
-        &self.shapes
-    }
-
     /// Passes every row of a log to `take`.
     ///
     /// # Errors
@@ -244,7 +232,7 @@ impl TableReader {
         match &stamped.entry {
             Entry::Event(event) => {
                 let columns = [("level", Kind::Integer), ("name", Kind::Text), ("message", Kind::Text)];
-                let table = place_of(&mut self.shapes, &mut self.events, &table_name(TOPIC_EVENTS), &columns);
+                let table = place_of(&mut self.shapes, TableShape::new(&table_name(TOPIC_EVENTS), &columns));
                 let cells = vec![
                     time,
                     Cell::Integer(i64::from(event.level)),
@@ -268,14 +256,11 @@ impl TableReader {
         let channel = log.channel(stamped.channel_id)?;
         let frame = frame_of(&stamped.data)?;
         let key = (frame.source(), frame.message_id());
-        let table = if let Some(table) = self.messages.get(&key) {
-            *table
-        } else {
-            self.shapes.push(shape_of_frame(&frame)?);
-            let table = self.shapes.len() - 1;
-            self.messages.insert(key, table);
-            table
+        let table = match self.messages.get(&key) {
+            Some(table) => *table,
+            None => place_of(&mut self.shapes, shape_of_frame(&frame)?),
         };
+        self.messages.insert(key, table);
         let fact = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
         let direction = if channel.topic == TOPIC_RAW_RX { "rx" } else { "tx" };
         let cells = cells_of_frame(&frame, [fact("endpoint"), direction, fact("link")]);
@@ -285,26 +270,16 @@ impl TableReader {
     /// A record of one of our packages, with the schema in the log.
     fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
         let channel = log.channel(stamped.channel_id).filter(|_| stamped.data.len() <= RECORD_MAX_BYTES)?;
-        let shapes = &mut self.shapes;
-        let known = match self.channels.entry(stamped.channel_id) {
-            Occupied(entry) => entry.into_mut(),
-            Vacant(entry) => {
-                let known = described(channel).and_then(|descriptor| {
-                    let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
-                    let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
-                    if matches!(stamped.entry, Entry::ComputerFrame(_)) {
-                        shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float));
-                    }
-                    // Two channels with one topic share a table.
-                    let table = shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
-                        shapes.push(shape);
-                        shapes.len() - 1
-                    });
-                    Some(OpenTable { table, descriptor, places })
-                });
-                entry.insert(known)
+        let opened = || {
+            let descriptor = described(channel)?;
+            let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
+            let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
+            if matches!(stamped.entry, Entry::ComputerFrame(_)) {
+                shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float));
             }
+            Some(OpenTable { table: place_of(&mut self.shapes, shape), descriptor, places })
         };
+        let known = self.channels.entry(stamped.channel_id).or_insert_with(opened);
         let OpenTable { table, descriptor, places } = known.as_ref()?;
         let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
         let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
@@ -321,7 +296,7 @@ impl TableReader {
             .into_iter()
             .chain(["value", "minimum", "maximum"].map(|name| (name, Kind::Float)))
             .chain([("passed", Kind::Integer)]);
-        let table = place_of(&mut self.shapes, &mut self.limits, &name, &columns.collect::<Vec<_>>());
+        let table = place_of(&mut self.shapes, TableShape::new(&name, &columns.collect::<Vec<_>>()));
         let row = |(standard, limit): (&str, &v1::LimitResult)| {
             let words = [standard, &limit.name, &limit.unit].map(|word| Cell::Text(word.to_owned()));
             let numbers = [limit.value, limit.minimum, limit.maximum].map(Cell::Float);
@@ -338,15 +313,10 @@ impl TableReader {
     }
 }
 
-/// The index of a table that has no schema.
-fn place_of(
-    shapes: &mut Vec<TableShape>,
-    place: &mut Option<usize>,
-    name: &str,
-    columns: &[(&str, Kind)],
-) -> usize {
-    *place.get_or_insert_with(|| {
-        shapes.push(TableShape::new(name, columns));
+/// The index of a table; two channels with one topic share one.
+fn place_of(shapes: &mut Vec<TableShape>, shape: TableShape) -> usize {
+    shapes.iter().position(|known| *known == shape).unwrap_or_else(|| {
+        shapes.push(shape);
         shapes.len() - 1
     })
 }

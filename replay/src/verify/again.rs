@@ -6,7 +6,6 @@ use avionics::log::logged::Logged as _;
 use flight::computer::Computer;
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerStart;
-use protocol::log::v1::LandingVerdict;
 use sim::fault::{Breakage, TimedFault, When};
 use sim::sortie::Sortie;
 use sim::wire::record;
@@ -72,9 +71,9 @@ impl WorldAgain {
 
     /// Whether the flight, whose log has ended, has the recorded verdict and follows from the run
     /// facts, and what is to be said of each.
-    pub(super) fn judge(&self, recorded: Option<&LandingVerdict>) -> [(bool, Option<String>); 2] {
-        let bytes = |verdict: Option<&LandingVerdict>| verdict.map(LandingVerdict::encode_to_vec);
-        let same = bytes(recorded) == bytes(record::verdict(&self.flight).as_ref());
+    pub(super) fn judge(&self, recorded: Option<&[u8]>) -> [(bool, Option<String>); 2] {
+        let again = record::verdict(&self.flight).map(|verdict| verdict.encode_to_vec());
+        let same = recorded == again.as_deref();
         let facts = match self.first_different {
             Some(frame) => format!("drawn again, the flight is another one from frame {frame} on"),
             None => BESIDE.to_owned(),

@@ -12,13 +12,13 @@ use prost::Message as _;
 use protocol::book::{Audit, PublicKey, RecordedHead, SignedHead, audit, shown as shown_hash};
 use protocol::dialect::MavMessage;
 use protocol::log::reader::{LogChannel, LogItem, LogReader};
-use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD, TOPIC_RAW_RX};
+use protocol::log::record::{TOPIC_BOOK, TOPIC_BOOK_HEAD};
 use protocol::log::v1::{BookEntry, BookHead};
 use protocol::program::Exit;
 use serde::Serialize;
 
 use crate::cli::{Answer, give};
-use crate::log::{LogError, frame_of, open_regular, take_magic};
+use crate::log::{LogError, frame_of, is_received, open_regular, take_magic};
 
 /// The result for one book.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -172,9 +172,7 @@ impl Contents {
                 let from = "the log itself".to_owned();
                 self.heads.extend(signed.map(|signed| RecordedHead { from, by_vehicle: false, signed }));
             }
-            TOPIC_RAW_RX
-                if channel.metadata.get("endpoint").is_some_and(|endpoint| endpoint == "vehicle") =>
-            {
+            _ if is_received(channel, "vehicle") => {
                 let message = frame_of(data).and_then(|frame| frame.decode().ok());
                 if let Some(MavMessage::TD_BOOK_HEAD(head)) = message {
                     let from = format!("the vehicle's log {}", self.name);

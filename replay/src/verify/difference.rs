@@ -6,6 +6,7 @@ use prost_reflect::{DynamicMessage, MessageDescriptor, ReflectMessage as _, Valu
 use protocol::log::computer_v1::ComputerFrame;
 use serde::Serialize;
 
+use super::VerifyReport;
 use crate::controller::phase_name;
 use crate::log::{LoggedFrame, frame_descriptor, misread_frame};
 
@@ -71,11 +72,8 @@ pub fn differences(
     }
     if found.is_empty() && recorded != recomputed {
         // Records with different bytes must not count as equal, even if no field differs.
-        found.push(difference(
-            "(record)".to_owned(),
-            &Value::Bytes(Bytes::new()),
-            &Value::Bytes(Bytes::new()),
-        ));
+        let bytes = Value::Bytes(Bytes::new());
+        found.push(difference("(record)".to_owned(), &bytes, &bytes));
     }
     found
 }
@@ -134,21 +132,14 @@ pub struct Divergence {
     pub fields: Vec<FieldDifference>,
 }
 
-/// The comparisons so far.
+/// The comparisons so far, beside what their report says of them.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tally {
-    pub(super) compared: u64,
-    /// Of these, in flight.
-    pub(super) in_flight: u64,
-    pub(super) different: u64,
-    /// Of these, with another output or another digest.
+    /// Frames with another output, or with another digest.
     pub(super) outputs_different: u64,
     pub(super) digests_different: u64,
-    pub(super) fields_different: u64,
-    /// Number and vehicle time, s, of the first and of the last frame.
-    pub(super) first: Option<(u64, f64)>,
-    pub(super) last: Option<(u64, f64)>,
-    pub(super) divergence: Option<Divergence>,
+    /// Vehicle time of the first frame, s.
+    first_s: Option<f64>,
     recorded: Vec<u8>,
     recomputed: Vec<u8>,
 }
@@ -160,6 +151,7 @@ impl Tally {
     /// The record cannot be understood exactly.
     pub(super) fn compare(
         &mut self,
+        report: &mut VerifyReport,
         logged: &LoggedFrame,
         data: &[u8],
         again: &ComputerFrame,
@@ -180,25 +172,26 @@ impl Tally {
                 ));
             }
         }
-        self.compared += 1;
-        self.in_flight += u64::from(logged.since_release.is_some());
-        self.first.get_or_insert((frame, boot_s));
-        self.last = Some((frame, boot_s));
+        report.frames_compared += 1;
+        report.frames_in_flight += u64::from(logged.since_release.is_some());
+        report.span = Some((report.span.map_or(frame, |(first, _)| first), frame));
+        report.flight_s = Some(boot_s - *self.first_s.get_or_insert(boot_s));
         if same {
             return Ok(());
         }
         let mut fields = differences(frame_descriptor().as_ref(), &self.recorded, &self.recomputed);
         let fields_different = fields.len();
         let time_s = logged.flight_time_s().unwrap_or(boot_s);
-        self.different += 1;
+        report.frames_different += 1;
         self.outputs_different +=
             u64::from(fields.iter().any(|field| !field.path.starts_with("input.") && field.path != DIGEST));
         self.digests_different += u64::from(recorded.state_digest != again.state_digest);
-        self.fields_different += fields_different as u64;
-        if self.divergence.is_none() {
+        report.fields_different += fields_different as u64;
+        if report.first_divergence.is_none() {
             fields.truncate(FIELDS_MAX);
             let (in_flight, phase) = (logged.since_release.is_some(), phase_name(&again.output));
-            self.divergence = Some(Divergence { frame, in_flight, time_s, phase, fields_different, fields });
+            report.first_divergence =
+                Some(Divergence { frame, in_flight, time_s, phase, fields_different, fields });
         }
         Ok(())
     }

@@ -18,7 +18,7 @@ use protocol::log::computer_v1::ComputerFrame;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give, warn_of_what_is_missing};
+use crate::cli::{Answer, give, recording};
 use crate::controller::{AgainError, LoggedComputer, phase_name};
 use crate::log::Recording;
 
@@ -106,8 +106,9 @@ pub(crate) fn plans(frame: &ComputerFrame) -> bool {
 /// See [`AgainError`].
 pub fn explain(recording: &Recording, number: u64) -> Result<FrameReport, AgainError> {
     let (start, frames) = recording.replayable_frames()?;
-    let computer = LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
-    let mut controller = if recording.from_power_up { computer.without_digests() } else { computer };
+    let mut controller =
+        LoggedComputer::recorded(recording.profile_toml()?, start, &recording.head.run, &[])?;
+    controller.compares_digests = !recording.from_power_up;
     let logged = |frame: &ComputerFrame| recording.release_frame + frame.input.frame;
     for recorded in frames {
         let again = controller.run_again(recorded)?;
@@ -207,7 +208,9 @@ impl Answer for FrameReport {
         let Self { file, frame, time_s, phase, level, burning_s, .. } = self;
         let verdict = self.judged.as_ref().map(|judged| format!(": {}", judged.verdict)).unwrap_or_default();
         let same = if self.identical { "identical bit for bit" } else { "NOT IDENTICAL" };
-        let [recorded, now] = [&self.recorded_gimbal_rad, &self.gimbal_rad].map(|angles| degrees(angles, 4));
+        let degrees = |rad: &f64| format!("{:.4}", rad.to_degrees());
+        let [recorded, now] = [&self.recorded_gimbal_rad, &self.gimbal_rad]
+            .map(|angles| angles.iter().map(degrees).collect::<Vec<_>>().join(" "));
         let mut lines = vec![
             format!("{file}: frame {frame} ({time_s:.3} s, {phase}), decided by {level}{verdict}"),
             format!(
@@ -243,13 +246,6 @@ impl Answer for FrameReport {
     }
 }
 
-/// One angle, or pitch and yaw.
-fn degrees(rad: &[f64], digits: usize) -> String {
-    rad.iter().map(|rad| format!("{:.digits$}", rad.to_degrees())).collect::<Vec<_>>().join(" ")
-}
-
 pub(super) fn run(file: &Path, frame: u64, json: bool) -> Result<Exit> {
-    let recording = Recording::open(file)?;
-    warn_of_what_is_missing(&recording);
-    give(&explain(&recording, frame)?, json)
+    give(&explain(&recording(file)?, frame)?, json)
 }

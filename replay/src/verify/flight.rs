@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use avionics::log::frame::estimate_to_log;
+use avionics::log::frame::{estimate_to_log, start_to_log};
 use protocol::log::computer_v1::ComputerStart;
 use protocol::log::record::{
     TOPIC_ESTIMATE, TOPIC_EVENTS, TOPIC_PILOT_TIMING, TOPIC_TRANSFORM, TOPIC_TRUTH_SAMPLE,
@@ -12,7 +12,7 @@ use super::again::WorldAgain;
 use super::difference::{Tally, encode_into};
 use super::inputs::Inputs;
 use super::parts::Part;
-use super::{FlightPlace, Obstacle, Verification, VerifyReport};
+use super::{FlightPlace, Obstacle, VerifyReport};
 use crate::controller::LoggedComputer;
 use crate::log::{
     Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, LoggedFrame, StampedEntry, misread_frame,
@@ -21,11 +21,11 @@ use crate::log::{
 /// One flight being verified.
 #[derive(Default)]
 pub(super) struct FlightVerifier {
+    /// Of what was read so far.
+    report: VerifyReport,
     computer: Option<LoggedComputer>,
     /// The computer has begun at its power-up, and was not built again at its release.
     from_power_up: bool,
-    /// The log has the power-up.
-    has_power_up: bool,
     /// The computer was built at a release, and remembers less than the recorded one.
     remembers_less: bool,
     order: FrameOrder,
@@ -33,15 +33,13 @@ pub(super) struct FlightVerifier {
     inputs: Inputs,
     awaited: Awaited,
     parts: Parts,
-    /// Frames read.
-    frames: u64,
     flies: bool,
-    obstacle: Option<Obstacle>,
     /// Why not every frame on the pad was compared.
     on_the_pad: Option<Obstacle>,
     /// Why some record could not be read.
     unreadable: Option<String>,
-    strict: bool,
+    /// Record of the verdict.
+    verdict: Option<Vec<u8>>,
     /// Of a strict verification from the release on: the world, if the log is of a drawn flight, or
     /// why it cannot be drawn again.
     world: Option<Result<WorldAgain, String>>,
@@ -74,7 +72,8 @@ impl FlightVerifier {
     /// beginning could not be read.
     pub(super) fn new(strict: bool, behind_another: bool, unreadable: Option<String>) -> Self {
         let order = if behind_another { FrameOrder::behind_another() } else { FrameOrder::default() };
-        Self { order, unreadable, strict, ..Self::default() }
+        let report = VerifyReport { strict, ..VerifyReport::default() };
+        Self { report, order, unreadable, ..Self::default() }
     }
 
     /// Takes a record of the flight.
@@ -87,7 +86,10 @@ impl FlightVerifier {
         match stamped.entry {
             Entry::ComputerStart(start) => self.start(&start, &stamped.data, log, complete_head)?,
             Entry::ComputerFrame(frame) => self.check(&frame, &stamped.data, stamped.lost_before),
-            Entry::Verdict(_) => self.parts.verdicts += 1,
+            Entry::Verdict(_) => {
+                self.parts.verdicts += 1;
+                self.verdict = Some(stamped.data);
+            }
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert(reason);
             }
@@ -114,7 +116,7 @@ impl FlightVerifier {
     ) -> Result<(), LogError> {
         let starts = &mut self.parts.starts;
         starts.recorded += u64::from(self.awaited.release.is_empty());
-        let runs = self.computer.is_some() && self.obstacle.is_none();
+        let runs = self.computer.is_some() && self.report.obstacle.is_none();
         let goes_on = start.released && (runs || self.flies);
         if goes_on {
             if runs {
@@ -122,7 +124,7 @@ impl FlightVerifier {
             }
             self.awaited.release.clear();
         }
-        let draws = self.strict && self.world.is_none() && start.released;
+        let draws = self.report.strict && self.world.is_none() && start.released;
         if goes_on && !draws {
             return Ok(());
         }
@@ -138,7 +140,7 @@ impl FlightVerifier {
             _ if goes_on => return Ok(()),
             lacking => {
                 let error = lacking.as_ref().and_then(|text| text.as_ref().err()).map(ToString::to_string);
-                self.obstacle = Some(error.map_or(Obstacle::NoProfile, Obstacle::ProfileUnreadable));
+                self.report.obstacle = Some(error.map_or(Obstacle::NoProfile, Obstacle::ProfileUnreadable));
                 return Ok(());
             }
         };
@@ -150,24 +152,25 @@ impl FlightVerifier {
             return Ok(());
         }
         match LoggedComputer::recorded(toml, start, &head.run, &[]) {
-            Ok(computer) => {
+            Ok(mut computer) => {
                 // What it begins from decides what it does.
                 self.parts.starts.compared += 1;
-                self.remembers_less = start.released && (self.frames > 0 || start.frame > 0);
-                self.computer = Some(if self.remembers_less { computer.without_digests() } else { computer });
+                self.remembers_less = start.released && (self.report.frames_recorded > 0 || start.frame > 0);
+                computer.compares_digests = !self.remembers_less;
+                self.computer = Some(computer);
                 self.from_power_up = !start.released;
-                self.has_power_up |= self.from_power_up;
-                self.on_the_pad = self.obstacle.take();
+                self.report.from_power_up |= self.from_power_up;
+                self.on_the_pad = self.report.obstacle.take();
                 self.awaited.release.clear();
             }
-            Err(error) => self.obstacle = Some(Obstacle::ProfileUnreadable(error.to_string())),
+            Err(error) => self.report.obstacle = Some(Obstacle::ProfileUnreadable(error.to_string())),
         }
         Ok(())
     }
 
     /// Runs a frame again and compares it; `data` are the bytes of its record.
     fn check(&mut self, frame: &LoggedFrame, data: &[u8], lost_before: u32) {
-        self.frames += 1;
+        self.report.frames_recorded += 1;
         self.flies |= frame.since_release.is_some();
         let number = frame.record.input.frame;
         let impossible = self.inputs.judge(&frame.record, frame.since_release);
@@ -182,26 +185,24 @@ impl FlightVerifier {
         // A computer that begins at its release can be run again behind a loss on the pad.
         let begins = !self.from_power_up && frame.since_release == Some(1);
         self.awaited.estimate.clear();
-        if self.obstacle.is_some() {
+        if self.report.obstacle.is_some() {
             return;
         }
+        let or_misread = |obstacle| Some(misread_frame(data).map_or(obstacle, Obstacle::Unreadable));
         let obstacle = match (lost.filter(|_| !begins), &mut self.computer) {
-            (_, None) => Some(match misread_frame(data) {
-                Some(reason) => Obstacle::Unreadable(reason),
-                None => Obstacle::NoStart,
-            }),
+            (_, None) => or_misread(Obstacle::NoStart),
             (Some(Gap { after: 0, before }), _) => Some(Obstacle::BeginningMissing(before)),
             (Some(gap), _) => Some(Obstacle::Gap(gap)),
             (None, Some(computer)) => match computer.run_again(&frame.record) {
                 Ok(again) => {
-                    if let Err(reason) = self.tally.compare(frame, data, &again) {
-                        self.obstacle = Some(Obstacle::Unreadable(reason));
+                    if let Err(reason) = self.tally.compare(&mut self.report, frame, data, &again) {
+                        self.report.obstacle = Some(Obstacle::Unreadable(reason));
                         return;
                     }
                     self.parts.digests += u64::from(!self.remembers_less);
                     if again.output.released {
                         self.parts.starts.recorded += 1;
-                        encode_into(&computer.as_start(), &mut self.awaited.release);
+                        encode_into(&start_to_log(computer.computer()), &mut self.awaited.release);
                     }
                     if frame.since_release.is_some()
                         && let Some(estimate) = estimate_to_log(computer.pilot())
@@ -214,13 +215,10 @@ impl FlightVerifier {
                     }
                     None
                 }
-                Err(error) => Some(match misread_frame(data) {
-                    Some(reason) => Obstacle::Unreadable(reason),
-                    None => Obstacle::Frame(error),
-                }),
+                Err(error) => or_misread(Obstacle::Frame(error)),
             },
         };
-        self.obstacle = obstacle;
+        self.report.obstacle = obstacle;
     }
 
     /// Compares the estimate after the last frame.
@@ -243,8 +241,8 @@ impl FlightVerifier {
         cut: Option<Cut>,
     ) -> VerifyReport {
         let parts = self.parts(log.head());
-        let Tally { compared, different, first, last, .. } = self.tally;
-        let obstacle = match (self.obstacle.or(self.on_the_pad), self.unreadable) {
+        let compared = self.report.frames_compared;
+        let obstacle = match (self.report.obstacle.or(self.on_the_pad), self.unreadable) {
             // An unreadable frame leaves a gap; the reason why it is unreadable says more than the
             // gap.
             (None | Some(Obstacle::Gap(_) | Obstacle::BeginningMissing(_)), Some(reason)) => {
@@ -266,35 +264,26 @@ impl FlightVerifier {
         let mut report = VerifyReport {
             file: log.name().to_owned(),
             flight,
-            outcome: Verification::Identical,
-            from_power_up: self.has_power_up,
             parts,
             counted: log.is_counted(),
-            frames_recorded: self.frames,
-            frames_compared: compared,
-            frames_identical: compared - different,
-            frames_different: different,
-            frames_in_flight: self.tally.in_flight,
-            fields_different: self.tally.fields_different,
-            span: first.zip(last).map(|((first, _), (last, _))| (first, last)),
-            flight_s: first.zip(last).map(|((_, first_s), (_, last_s))| last_s - first_s),
-            first_divergence: self.tally.divergence,
+            frames_identical: compared - self.report.frames_different,
             obstacle,
             cut,
             damage: damage.map(ToString::to_string),
             build: head.compare_build(),
-            strict: self.strict,
+            ..self.report
         };
         report.conclude();
-        if self.strict {
-            report.compare_strictly(self.world, log.verdict().map(|found| found.verdict).as_ref());
+        if report.strict {
+            report.compare_strictly(self.world, self.verdict.as_deref());
         }
         report
     }
 
     fn parts(&self, head: &Head) -> Vec<Part> {
-        let Self { frames, tally, parts, .. } = self;
-        let part = |name, compared, different| Part { compared, different, ..Part::of(name, *frames) };
+        let Self { report, tally, parts, .. } = self;
+        let frames = report.frames_recorded;
+        let part = |name, compared, different| Part { compared, different, ..Part::of(name, frames) };
         let digests = part("digests", parts.digests, tally.digests_different);
         let remembers_less =
             "a computer that is run again from its release on does not remember what was before";
@@ -317,8 +306,8 @@ impl FlightVerifier {
                 why: parts.inputs.why.clone().or_else(|| Some(JUDGED.to_owned())),
                 ..parts.inputs.clone()
             },
-            part("frames", tally.compared, tally.different),
-            part("outputs", tally.compared, tally.outputs_different),
+            part("frames", report.frames_compared, report.frames_different),
+            part("outputs", report.frames_compared, tally.outputs_different),
             if self.remembers_less { digests.because(remembers_less) } else { digests },
             Part { name: "estimates", why, follows: true, ..estimates.clone() },
             Part { name: "starts", follows: true, ..parts.starts.clone() },

@@ -8,7 +8,7 @@ use avionics::log::frame::phase_of;
 use flight::computer::{FRAME_S, flight_time_s};
 use flight::rules::phase::Phase;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput};
-use protocol::log::flight_v1::{Measurements, Vector3};
+use protocol::log::flight_v1::{GnssFix, Measurements, Vector3};
 
 /// No servo turns further, rad.
 const ANGLE_MAX_RAD: f64 = 2.0;
@@ -48,19 +48,12 @@ pub(super) struct Inputs {
     switched: u64,
 }
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct LastInput {
-    frame: u64,
+    input: ComputerInput,
     in_flight: bool,
-    pin_out: bool,
-    booster_attached: bool,
     /// A foot touches the ground before the landing motor is ignited.
     struck: bool,
-    battery_v: Option<f64>,
-    log_running: bool,
-    space_bytes: u64,
-    uplink_age_s: Option<f64>,
-    commander_age_s: Option<f64>,
 }
 
 impl Inputs {
@@ -72,26 +65,21 @@ impl Inputs {
             self.release_frame = input.frame.checked_sub(number);
         }
         let now = LastInput {
-            frame: input.frame,
+            input: input.clone(),
             in_flight: since_release.is_some(),
-            pin_out: input.pin_out,
-            booster_attached: input.booster_attached,
             struck: input.contact && phase_of(output).is_some_and(|phase| phase < Phase::Ignition),
-            battery_v: input.battery_v,
-            log_running: input.log.running,
-            space_bytes: input.log.space_bytes,
-            uplink_age_s: input.uplink.as_ref().and_then(|uplink| uplink.age_s),
-            commander_age_s: input.commander.as_ref().map(|commander| commander.age_s),
         };
-        let before = self.last.replace(now);
-        let fired = flight_time_s(now.frame.saturating_sub(self.switched)) <= FIRED_S;
+        let fired = flight_time_s(input.frame.saturating_sub(self.switched)) <= FIRED_S;
         let step_v = if fired { FIRED_STEP_V } else { BATTERY_STEP_V };
         let outputs = [output.ignite, output.parachute, output.ignite_booster, output.separate_booster];
         if outputs != self.outputs {
-            (self.outputs, self.switched) = (outputs, now.frame);
+            (self.outputs, self.switched) = (outputs, input.frame);
         }
-        out_of_range(input, self.release_frame)
-            .or_else(|| before.and_then(|before| out_of_order(&before, &now, step_v)))
+        let before = self.last.as_ref();
+        let impossible = out_of_range(input, self.release_frame)
+            .or_else(|| before.and_then(|before| out_of_order(before, &now, step_v)));
+        self.last = Some(now);
+        impossible
     }
 }
 
@@ -110,39 +98,31 @@ fn out_of_range(input: &ComputerInput, release_frame: Option<u64>) -> Option<Str
     let within = |most: f64| [-most, most];
     let uplinks = input.requests.iter().map(|request| &request.uplink).chain([&input.uplink]);
     let uplink_ages: Vec<f64> = uplinks.filter_map(|uplink| uplink.as_ref()?.age_s).collect();
-    let commander_age_s = input.commander.as_ref().map(|commander| commander.age_s);
+    let commander_age_s = commander_age_s(input);
     let [gyro, force] = [imu.gyro_rad_s, imu.specific_force_m_s2].map(vector);
-    let [place, velocity] =
-        [gnss.map(|fix| vector(fix.position_m)), gnss.map(|fix| vector(fix.velocity_m_s))];
+    let of_fix = |value: fn(&GnssFix) -> Vector3| gnss.iter().flat_map(|fix| vector(value(fix))).collect();
+    let [place, velocity]: [Vec<f64>; 2] = [of_fix(|fix| fix.position_m), of_fix(|fix| fix.velocity_m_s)];
     let fix_s = gnss.map(|fix| fix.valid_at_s);
     let ages = [-ROUNDING_S, f64::MAX];
-    let feedback: [Row; 6] = [
-        ("angle of a servo, rad,", &input.gimbal_rad, within(ANGLE_MAX_RAD)),
-        ("angle of a servo, rad,", &input.fins_rad, within(ANGLE_MAX_RAD)),
-        ("battery, V,", input.battery_v.as_slice(), [0.0, BATTERY_MAX_V]),
-        ("age of the uplink, s,", &uplink_ages, ages),
-        ("age of the commander, s,", commander_age_s.as_slice(), ages),
-        ("time of a fix, s,", fix_s.as_slice(), [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S]),
+    // What a value is, the values, the least and the greatest that it can have, and whether it is
+    // of a sensor, which reports NaN if it is silent or broken.
+    let rows: [(&str, &[f64], [f64; 2], bool); 12] = [
+        ("angle of a servo, rad,", &input.gimbal_rad, within(ANGLE_MAX_RAD), false),
+        ("angle of a servo, rad,", &input.fins_rad, within(ANGLE_MAX_RAD), false),
+        ("battery, V,", input.battery_v.as_slice(), [0.0, BATTERY_MAX_V], false),
+        ("age of the uplink, s,", &uplink_ages, ages, false),
+        ("age of the commander, s,", commander_age_s.as_slice(), ages, false),
+        ("time of a fix, s,", fix_s.as_slice(), [clock_s - FIX_AGE_MAX_S, clock_s + ROUNDING_S], false),
+        ("gyro, rad/s,", &gyro, within(RATE_MAX_RAD_S), true),
+        ("accelerometer, m/s2,", &force, within(FORCE_MAX_M_S2), true),
+        ("pressure altitude, m,", pressure_altitude_m.as_slice(), within(PLACE_MAX_M), true),
+        ("lidar range, m,", lidar_range_m.as_slice(), within(RANGE_MAX_M), true),
+        ("position of GNSS, m,", &place, within(PLACE_MAX_M), true),
+        ("velocity of GNSS, m/s,", &velocity, within(SPEED_MAX_M_S), true),
     ];
-    // A sensor that is silent or broken reports NaN.
-    let measured: [Row; 6] = [
-        ("gyro, rad/s,", &gyro, within(RATE_MAX_RAD_S)),
-        ("accelerometer, m/s2,", &force, within(FORCE_MAX_M_S2)),
-        ("pressure altitude, m,", pressure_altitude_m.as_slice(), within(PLACE_MAX_M)),
-        ("lidar range, m,", lidar_range_m.as_slice(), within(RANGE_MAX_M)),
-        ("position of GNSS, m,", place.as_ref().map_or(&[], |place| place), within(PLACE_MAX_M)),
-        ("velocity of GNSS, m/s,", velocity.as_ref().map_or(&[], |velocity| velocity), within(SPEED_MAX_M_S)),
-    ];
-    outside(&feedback, |_| false).or_else(|| outside(&measured, f64::is_nan))
-}
-
-/// What a value is, the values, and the least and the greatest that it can have.
-type Row<'a> = (&'a str, &'a [f64], [f64; 2]);
-
-/// Why a value of these rows cannot be, but for those that may be anything.
-fn outside(rows: &[Row], may_be: fn(f64) -> bool) -> Option<String> {
-    rows.iter().find_map(|(what, values, [lowest, highest])| {
-        let outside = values.iter().find(|value| !(lowest..=highest).contains(value) && !may_be(**value))?;
+    rows.into_iter().find_map(|(what, values, [lowest, highest], may_be_nan)| {
+        let can_be = |value: &f64| (lowest..=highest).contains(value) || may_be_nan && value.is_nan();
+        let outside = values.iter().find(|value| !can_be(value))?;
         Some(format!("{what} {outside:?}: can be {lowest} to {highest}"))
     })
 }
@@ -151,7 +131,12 @@ fn vector(Vector3 { x, y, z }: Vector3) -> [f64; 3] {
     [x, y, z]
 }
 
-fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<String> {
+fn commander_age_s(input: &ComputerInput) -> Option<f64> {
+    input.commander.as_ref().map(|commander| commander.age_s)
+}
+
+fn out_of_order(last: &LastInput, this: &LastInput, step_v: f64) -> Option<String> {
+    let (before, now) = (&last.input, &this.input);
     let passed_s = now.frame.saturating_sub(before.frame) as f64 * FRAME_S;
     // An age grows with time, or restarts with the next reception.
     let aged = |what: &str, then: Option<f64>, now: Option<f64>| {
@@ -159,19 +144,19 @@ fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<Stri
         (now > then + passed_s + ROUNDING_S)
             .then(|| format!("{what} is {now:?} s old, {passed_s:.3} s after it was {then:?} s old"))
     };
-    let flew = before.in_flight && now.in_flight;
+    let flew = last.in_flight && this.in_flight;
     if flew && before.pin_out && !now.pin_out {
         return Some("the pin is in again, in flight".to_owned());
     }
     if flew && now.booster_attached && !before.booster_attached {
         return Some("the booster is attached again, in flight".to_owned());
     }
-    if flew && before.struck && !now.struck {
+    if flew && last.struck && !this.struck {
         return Some("the contact has ended before the landing motor was ignited".to_owned());
     }
-    let [then, space] = [before.space_bytes, now.space_bytes];
+    let [then, space] = [before.log.space_bytes, now.log.space_bytes];
     // A disk that does not answer has none.
-    if then.min(space) > 0 && then.abs_diff(space) > SPACE_STEP_BYTES && before.log_running == now.log_running
+    if then.min(space) > 0 && then.abs_diff(space) > SPACE_STEP_BYTES && before.log.running == now.log.running
     {
         return Some(format!("space for the log goes from {then} to {space} bytes in {passed_s:.3} s"));
     }
@@ -180,6 +165,7 @@ fn out_of_order(before: &LastInput, now: &LastInput, step_v: f64) -> Option<Stri
     {
         return Some(format!("the battery goes from {then:?} to {now:?} V in {passed_s:.3} s"));
     }
-    aged("the uplink", before.uplink_age_s, now.uplink_age_s)
-        .or_else(|| aged("the commander", before.commander_age_s, now.commander_age_s))
+    let uplink_age_s = |input: &ComputerInput| input.uplink.as_ref()?.age_s;
+    aged("the uplink", uplink_age_s(before), uplink_age_s(now))
+        .or_else(|| aged("the commander", commander_age_s(before), commander_age_s(now)))
 }

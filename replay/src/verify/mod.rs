@@ -28,7 +28,6 @@ mod parts;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use self::again::WorldAgain;
 use self::flight::FlightVerifier;
@@ -36,7 +35,6 @@ use anyhow::{Result, bail};
 pub use difference::{Divergence, FieldDifference, FieldValue, differences, ulp_distance};
 pub use parts::Part;
 use protocol::log::record::{SCHEMA_VERSION, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_VERDICT};
-use protocol::log::v1::LandingVerdict;
 use protocol::program::Exit;
 use serde::Serialize;
 
@@ -89,7 +87,7 @@ pub fn verify_log<R: Read>(
     // An unreadable record before the first flight may have been its beginning.
     let mut unreadable = None;
     while let Some(stamped) = log.next_entry()? {
-        if log.flights().found().len() > computers.len() {
+        if log.flights.found.len() > computers.len() {
             computers.push(FlightVerifier::new(strict, !computers.is_empty(), unreadable.take()));
         }
         let Some(computer) = computers.last_mut() else {
@@ -106,16 +104,17 @@ pub fn verify_log<R: Read>(
     let of = computers.len();
     let report = |(place, computer): (usize, FlightVerifier)| {
         let flight = (of > 1).then_some(FlightPlace { number: place + 1, of });
-        computer.into_report(log, flight, log.flights().found().get(place).and_then(LoggedFlight::cut))
+        computer.into_report(log, flight, log.flights.found.get(place).and_then(LoggedFlight::cut))
     };
     Ok(computers.into_iter().enumerate().map(report).collect())
 }
 
 /// The result of a verification.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verification {
     /// The flight is whole, has frames, and all that was compared is identical.
+    #[default]
     Identical,
     /// The log is damaged, ends before its flight did or lacks a part, and what could be compared
     /// is identical.
@@ -186,7 +185,7 @@ pub struct FlightPlace {
 }
 
 /// The report on one flight.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct VerifyReport {
     /// The log.
     pub file: String,
@@ -239,11 +238,7 @@ impl VerifyReport {
 
     /// Compares what only a strict verification does. `world`: that of the flight, drawn again;
     /// `recorded`: its verdict.
-    fn compare_strictly(
-        &mut self,
-        world: Option<Result<WorldAgain, String>>,
-        recorded: Option<&LandingVerdict>,
-    ) {
+    fn compare_strictly(&mut self, world: Option<Result<WorldAgain, String>>, recorded: Option<&[u8]>) {
         let is_flown = self.part("truth").is_some_and(|truth| truth.recorded > 0);
         let judged = match world {
             _ if self.flight.is_some() => Err("a file with several flights is not flown again".to_owned()),
@@ -441,24 +436,16 @@ impl Args {
             let [file] = self.files.as_slice() else { bail!("--explain takes one log") };
             return explain::run(file, frame, self.json);
         }
-        self.verify()
-    }
-
-    fn verify(&self) -> Result<Exit> {
         let mut files = Vec::new();
         for file in &self.files {
             if file.is_dir() { files.extend(logs_of(file)?) } else { files.push(file.clone()) }
         }
         give_each(&files, self.json, |file| {
-            #[expect(clippy::disallowed_methods, reason = "reports the speed to the user; decides nothing")]
-            let started = Instant::now();
-            let found = if self.strict { verify_strictly(file)? } else { verify(file)? };
-            let took = started.elapsed();
+            let found = verify_as(file, self.strict)?;
             for report in &found {
                 warn_of_loss(&report.file, report.damage.as_deref(), report.cut.as_ref());
                 warn_of_build(report);
             }
-            print_speed(&found, took);
             Ok(found)
         })
     }
@@ -469,16 +456,5 @@ fn warn_of_build(report: &VerifyReport) {
     if report.outcome == Verification::Diverged && !differences.is_empty() {
         let facts: Vec<&str> = differences.iter().map(|difference| difference.fact.as_str()).collect();
         print_note(&format!("note: another build wrote {}; it differs in {}", report.file, facts.join(", ")));
-    }
-}
-
-fn print_speed(reports: &[VerifyReport], took: Duration) {
-    let seconds = took.as_secs_f64();
-    let flight_s: f64 = reports.iter().filter_map(|report| report.flight_s).sum();
-    if flight_s > 0.0 && seconds > 0.0 {
-        print_note(&format!(
-            "{flight_s:.1} s of flight in {seconds:.2} s, {:.0} times real time",
-            flight_s / seconds
-        ));
     }
 }

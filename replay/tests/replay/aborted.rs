@@ -3,7 +3,7 @@
 use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
 use replay::log::{Moment, Recording};
-use replay::refly::{ReflyOptions, refly_flight};
+use replay::refly::{ReflyOptions, refly};
 use replay::verify::{Verification, verify};
 
 use crate::flown::only;
@@ -17,8 +17,8 @@ fn an_aborted_flight_from_apogee_verifies_and_is_reflown_identically() {
     let report = only(verify(&aborted.log).unwrap());
     assert_eq!((report.outcome, report.obstacle), (Verification::Identical, None));
     let landing = ReflyOptions { start: Some(Moment::Phase(Phase::Powered)), ..ReflyOptions::default() };
-    let (report, again) = refly_flight(&recording, &landing).unwrap();
+    let report = refly(&recording, &landing).unwrap();
     assert_eq!(report.commands_identical, report.frames, "the moment that was drawn is drawn again");
-    assert_eq!(again.verdict, recording.verdict);
+    assert_eq!(report.reflown, recording.verdict);
     assert!(aborted.landed);
 }

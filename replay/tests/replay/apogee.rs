@@ -70,7 +70,7 @@ fn without_changes_the_flight_is_the_same_bit_for_bit() {
         assert_eq!((reached.identical, reached.first_different), (reached.frames, None), "{start:?}");
         assert_eq!(report.commands_identical, report.frames, "{start:?}");
         assert_eq!(reached.frames + report.frames, recording.frames.len(), "{start:?}");
-        assert_eq!(flown.verdict, recording.verdict, "{start:?}");
+        assert_eq!(report.reflown, recording.verdict, "{start:?}");
         assert_eq!(report.verdict_changed, Some(false));
         let again = flown.records.iter().filter_map(|(_, record)| match record {
             Record::ComputerFrame(frame) => Some(frame.as_ref()),
@@ -148,13 +148,13 @@ fn a_flight_flown_again_is_a_log_that_verifies() {
             ReflyOptions { start: Some(Moment::Frame(1)), ..with(&["ignition.fixed_height_m=40.0"]) },
         ),
     ] {
-        let (_, flown) = refly_flight(&recording, &options).unwrap();
+        let (report, flown) = refly_flight(&recording, &options).unwrap();
         let path = LANDED.beside(name);
         write_log(&path, &recording, &flown).unwrap();
         let verified = only(verify(&path).unwrap());
         assert_eq!((verified.outcome, verified.first_divergence), (Verification::Identical, None), "{name}");
         let again = Recording::open(&path).unwrap();
-        assert_eq!(again.verdict, flown.verdict, "{name}");
+        assert_eq!(again.verdict, report.reflown, "{name}");
         assert!(evaluate(&again, &[]).unwrap().commands_different == 0, "{name}");
         assert!(matches!(refly(&again, &ReflyOptions::default()), Err(AgainError::Refused { .. })), "{name}");
     }

@@ -132,7 +132,7 @@ fn a_question_without_an_answer_exits_1_with_the_reason() {
         &["refly"],
         &["verify", "--explain", "1"],
         &["report", "--out", "-"],
-        &["export", "--to", "csv", "--out", &output],
+        &["export", "--out", &output],
         &["compare"],
     ];
     for bytes in [&b""[..], b"\x89PNG\r\n\x1a\n", &foreign_mcap("/pose"), b"\x89MCAP0\r\n"] {

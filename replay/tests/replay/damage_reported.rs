@@ -41,8 +41,7 @@ fn a_log_cut_before_its_first_message_has_no_answer() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("cut.mcap");
     let tables = directory.path().join("csv").display().to_string();
-    let questions: [&[&str]; 4] =
-        [&["info"], &["verify"], &["evaluate"], &["export", "--to", "csv", "--out", &tables]];
+    let questions: [&[&str]; 4] = [&["info"], &["verify"], &["evaluate"], &["export", "--out", &tables]];
     for log in [&LANDED.log, &MK2.log] {
         std::fs::write(&path, &std::fs::read(log).unwrap()[..100]).unwrap();
         for question in questions {
@@ -70,7 +69,7 @@ fn no_command_is_silent_about_damage() {
         &["refly", "--out", &again],
         &["verify", "--explain", "20"],
         &["report", "--out", &html],
-        &["export", "--to", "csv", "--out", &csv],
+        &["export", "--out", &csv],
         &["recover", &whole],
         &["compare", path.to_str().unwrap()],
     ];

@@ -1,6 +1,7 @@
 //! Tests fits of flight logs, through the command and the library.
 
 use std::io::Cursor;
+use std::path::Path;
 use std::process::Command;
 use std::sync::LazyLock;
 
@@ -77,7 +78,7 @@ fn a_broken_part_is_reported_with_its_reason_and_the_rest_is_found() {
         ("gimbal-jams:3.7@ignition", &gimbal, not_its_model, "thrust_scale"),
         ("early-burnout:2@0", &["thrust_scale"], not_its_curve, "drag_per_mass_scale"),
     ] {
-        let fit = fit(&Trace::open(&crate::from_apogee::fly(&[fault]).log).unwrap());
+        let fit = fit(&trace(&crate::from_apogee::fly(&[fault]).log));
         for name in lacks {
             let lack = fit.not_found.iter().find(|lack| lack.name == *name).unwrap();
             assert!(lack.reason.starts_with(reason) && fit.get(name).is_none(), "{fault}: {lack:?}");
@@ -117,7 +118,7 @@ fn intervals_state_on_how_many_flights_they_were_calibrated() {
 
 #[test]
 fn val_simulation_the_gimbals_feedback_shows_its_delay_and_rate() {
-    let fit = fit(&Trace::open(&MK2.log).unwrap());
+    let fit = fit(&trace(&MK2.log));
     close(&fit, "gimbal_delay", 0.020, 0.001);
     close(&fit, "gimbal_rate", 250.0, 10.0);
 }
@@ -203,7 +204,11 @@ fn a_stands_table_needs_its_motor() {
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| std::fs::read(&LANDED.log).unwrap());
 
 /// Frames of a flight without the rest of its log, for cuts and losses.
-static TRACE: LazyLock<Trace> = LazyLock::new(|| Trace::open(&LANDED.log).unwrap());
+fn trace(log: &Path) -> Trace {
+    Trace::of(&Recording::open(log).unwrap()).unwrap()
+}
+
+static TRACE: LazyLock<Trace> = LazyLock::new(|| trace(&LANDED.log));
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]

@@ -37,11 +37,11 @@ fn val_hand_an_altos_file() {
     for step in TIMES {
         let (state, height) = (if step < 20 { "boost" } else { "main" }, height_m(step));
         let north_deg = 35.0 + f64::from(step) * 1e-5;
-        text += &format!(
+        text.extend([format!(
             "5,1,2,N0CALL,{:8.2},0,0,0,1,{state:>8},900,1300,{height:8.2},{:8.2},1,{north_deg:.7},-117.0,1300\n",
             f64::from(step) / 10.0,
             15.0 - 1.5 * f64::from(step),
-        );
+        )]);
     }
     let (flight, missing) = imported("altos.csv", text.as_bytes());
     assert_eq!(missing, ["horizontal velocity", "tilt"]);
@@ -57,8 +57,11 @@ fn val_hand_a_rocketpy_file() {
         "# Time (s),X (m),Y (m),Z (m),Vx (m/s),Vy (m/s),Vz (m/s),Attitude Angle (\u{b0})\n".to_owned();
     for step in TIMES {
         let time_s = f64::from(step) / 10.0;
-        text +=
-            &format!("{time_s:.6},{time_s:.6},{:.6},{:.6},1,2,0,80\n", 2.0 * time_s, 1400.0 + height_m(step));
+        text.extend([format!(
+            "{time_s:.6},{time_s:.6},{:.6},{:.6},1,2,0,80\n",
+            2.0 * time_s,
+            1400.0 + height_m(step)
+        )]);
     }
     let (flight, missing) = imported("rocketpy.csv", text.as_bytes());
     assert!(missing.is_empty(), "{missing:?}");

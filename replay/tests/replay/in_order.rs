@@ -33,7 +33,7 @@ fn assert_refused_as_unordered(log: &Path, directory: &Path) {
         &["evaluate"],
         &["refly"],
         &["report", "--out", page],
-        &["export", "--to", "csv", "--out", csv],
+        &["export", "--out", csv],
     ];
     for question in questions {
         let (code, stdout, stderr) = run(replay(question[0], log).args(&question[1..]));

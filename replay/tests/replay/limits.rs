@@ -194,7 +194,7 @@ fn many_facts_many_limits_and_many_words_do_not_fill_the_memory() {
         for question in [
             &["info"][..],
             &["verify"],
-            &["export", "--to", "csv", "--out", csv.to_str().unwrap()],
+            &["export", "--out", csv.to_str().unwrap()],
             &["report", "--out", "-"],
             &["compare", path.to_str().unwrap()],
         ] {
@@ -275,7 +275,7 @@ fn a_hundred_megabytes_are_exported_in_bounded_memory() {
     let path = directory.path().join("long.mcap");
     let frames = write_long_log(&path, 100 << 20);
     let tables = directory.path().join("tables");
-    let arguments = ["export", "--to", "csv", "--out", tables.to_str().unwrap()];
+    let arguments = ["export", "--out", tables.to_str().unwrap()];
     let (code, said) = within(64, &arguments, &path);
     assert_eq!(code, 0, "{said}");
     let table = std::fs::read_to_string(tables.join("computer_frame.csv")).unwrap();

@@ -3,7 +3,7 @@
 
 use replay::info::info;
 use replay::log::{Moment, Recording};
-use replay::refly::{FaultChanges, ReflyOptions, refly_flight, write_log};
+use replay::refly::{FaultChanges, ReflyOptions, refly, refly_flight, write_log};
 use replay::report::report;
 use replay::verify::{Verification, verify};
 
@@ -29,14 +29,14 @@ fn the_same_flight_with_and_without_a_fault() {
     assert_ne!(healthy.verdict, broken.verdict);
     for start in [None, Some(Moment::Frame(1))] {
         let without = ReflyOptions { start, ..changed(&[], &["weak-motor", "gnss-out@5"]) };
-        let (report, flown) = refly_flight(&broken, &without).unwrap();
-        assert_eq!(flown.verdict, healthy.verdict, "{start:?}");
+        let report = refly(&broken, &without).unwrap();
+        assert_eq!(report.reflown, healthy.verdict, "{start:?}");
         assert!(report.recorded.is_some() && report.faults == without.faults);
         let with = ReflyOptions { start, ..changed(&FAULTS, &[]) };
-        assert_eq!(refly_flight(&healthy, &with).unwrap().1.verdict, broken.verdict);
+        assert_eq!(refly(&healthy, &with).unwrap().reflown, broken.verdict);
     }
-    let (report, flown) = refly_flight(&broken, &changed(&[], &["all"])).unwrap();
-    assert_eq!(flown.verdict, healthy.verdict);
+    let report = refly(&broken, &changed(&[], &["all"])).unwrap();
+    assert_eq!(report.reflown, healthy.verdict);
     assert_eq!(
         report.verdict_changed,
         Some(healthy.verdict.unwrap().landing.stands != broken.verdict.unwrap().landing.stands)

@@ -76,19 +76,19 @@ fn tables_get_a_new_folder() {
     let at = |name: &str| directory.path().join(name);
     std::fs::create_dir_all(at("tables")).unwrap();
     std::fs::write(at("tables").join("notes.txt"), OTHERS).unwrap();
-    let (code, _, stderr) = run(replay("export", &log).args(["--to", "csv", "--out"]).arg(at("tables")));
+    let (code, _, stderr) = run(replay("export", &log).args(["--out"]).arg(at("tables")));
     assert_eq!(code, 0, "{stderr}");
     assert_eq!(listed(&at("tables")), ["notes.txt"]);
     assert!(at("tables-2").join("vehicle_truth3d.csv").is_file());
     // A folder that has no other name.
     let before = std::fs::read(at("tables-2").join("events.csv")).unwrap();
     let mut here = replay("export", &log);
-    let refused = refusal(here.args(["--to", "csv", "--out", "."]).current_dir(at("tables-2")));
+    let refused = refusal(here.args(["--out", "."]).current_dir(at("tables-2")));
     assert!(refused.contains(".: cannot be written"), "{refused}");
     assert_eq!(std::fs::read(at("tables-2").join("events.csv")).unwrap(), before);
     std::fs::create_dir(at("empty")).unwrap();
     let mut here = replay("export", &log);
-    let (code, _, stderr) = run(here.args(["--to", "csv", "--out", "."]).current_dir(at("empty")));
+    let (code, _, stderr) = run(here.args(["--out", "."]).current_dir(at("empty")));
     assert!(code == 0 && at("empty").join("events.csv").is_file(), "{stderr}");
 }
 

@@ -3,7 +3,7 @@
 use replay::log::Recording;
 use replay::refly::{ReflyOptions, refly};
 
-use crate::command_line::{data, refusal, replay};
+use crate::command_line::{data, replay};
 use crate::flown::{Recipe, write_log};
 use crate::from_apogee::LANDED;
 use crate::simulated::MK2;
@@ -17,17 +17,6 @@ fn flights_with_nothing_in_common_are_not_alike() {
     let (code, found) = data(replay("compare", &MK2.log).arg(&nothing));
     assert_eq!((code, found[0]["signals"].as_array().unwrap().len()), (3, 0));
     assert!(found[0]["verdicts"][0]["landing"]["stands"] == true, "the verdict is still reported: {found}");
-}
-
-/// What a file is matters more than what is missing of the command.
-#[test]
-fn a_file_that_is_no_log_is_named_before_a_missing_format() {
-    let file = MK2.beside("nothing-in-it.mcap");
-    for (bytes, words) in [("", "is empty"), ("no log", "is not a flight log")] {
-        std::fs::write(&file, bytes).unwrap();
-        assert!(refusal(&mut replay("export", &file)).contains(words), "{words}");
-    }
-    assert!(refusal(&mut replay("export", &MK2.log)).contains("--to is missing"));
 }
 
 /// In a log that ends early, only the recorded part can be identical.

@@ -283,7 +283,7 @@ fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], is_spliced: bo
     let strictly = |path: &PathBuf| run(replay("verify", path).arg("--strict")).0;
     assert_ne!(strictly(&input), 0, "{what}: the harmed log itself");
     let Ok(recovery) = recover(&input, &output) else { return };
-    if recovery.out_of_order {
+    if recovery.recovered.out_of_order {
         assert!(recovery.fault().unwrap().contains("not in order of time"), "{what}: {recovery:?}");
         assert_ne!(strictly(&output), 0, "{what}: the recovered log");
         return;
@@ -313,8 +313,8 @@ fn assert_nothing_is_laundered(original: &Original, bytes: &[u8], is_spliced: bo
     let unreported = unreported.map(|(topic, at_ns, ..)| (topic, (*at_ns as f64 - first_ns as f64) / 1e9));
     // Without an end mark the rest is unknown; without its channel's record a message has no topic;
     // and a chunk that is not there leaves only the count of messages.
-    let is_counted = recovery.messages_counted.is_some_and(|counted| counted != recovery.messages);
-    let open_end = !recovery.ended || recovery.undecodable > 0 || is_counted;
+    let is_counted = recovery.messages_counted.is_some_and(|counted| counted != recovery.recovered.messages);
+    let open_end = !recovery.ended || recovery.recovered.undecodable > 0 || is_counted;
     assert!(
         unreported.is_none() || open_end,
         "{what}: {unreported:?} is lost and not reported: {recovery:?}"
@@ -340,7 +340,7 @@ fn bytes_missing_in_a_chunk_lose_that_chunk_alone() {
     let bytes = harmed(original, Harm::Shortened, 1, 299);
     let directory = tempfile::tempdir().unwrap();
     let (recovery, _) = recovered(&bytes, directory.path()).unwrap();
-    assert_eq!(recovery.chunks as usize, original.chunks.len() - 1, "{recovery:?}");
+    assert_eq!(recovery.recovered.chunks as usize, original.chunks.len() - 1, "{recovery:?}");
     assert!(recovery.ended);
 }
 

@@ -3,7 +3,7 @@
 
 use flight::rules::phase::Phase;
 use replay::log::{Moment, Recording};
-use replay::refly::{ReflyOptions, refly_flight, write_log};
+use replay::refly::{ReflyOptions, refly, refly_flight, write_log};
 use replay::verify::{Verification, verify};
 
 use crate::flown::only;
@@ -64,7 +64,6 @@ fn a_setting_timed_before_the_start_applies_from_the_start() {
     let timed = ReflyOptions { start, ..with(&["ignition.fixed_height_m=80@0.1"]) };
     let again = written("timed_early.mcap", &recording, &timed);
     let lasting = ReflyOptions { start, settings: settings(&["ignition.fixed_height_m=80"]), ..timed };
-    let lasting = refly_flight(&recording, &lasting).unwrap().1;
-    assert_eq!(again.verdict, lasting.verdict);
+    assert_eq!(again.verdict, refly(&recording, &lasting).unwrap().reflown);
     assert_ne!(again.frames, recording.frames);
 }

@@ -212,9 +212,9 @@ impl<'a> VehicleState<'a> {
         Some(Planned { plan, time_to_go_s: plan.left_s(air.flown.time_s) })
     }
 
-    /// Expected touchdown position in the world's axes, m: in the burn the end of its plan, before it
-    /// under the motor, otherwise where the present velocity leads to. NaN under a parachute until
-    /// it drifts with the wind.
+    /// Expected touchdown position in the world's axes, m: in the burn the end of its plan, before
+    /// it under the motor, otherwise where the present velocity leads to. NaN under a parachute
+    /// until it drifts with the wind.
     pub fn touchdown_m(&self, air: &Airborne<'_>) -> Vector2<f64> {
         let (place, velocity) = (&air.estimate.state.position_m, &air.estimate.state.velocity_m_s);
         if self.phase().before_apogee() {

@@ -3,12 +3,12 @@
 //!
 //! Each fin is a quarter of the fuselage's skin, with its hinge near the nose; `kappa` is its
 //! opening angle, 0 closed against the body and pi/2 fully open. (Eq. 1 prints `pi - X_b . Y_f`,
-//! which is no angle.) Body axes are those of
-//! [`crate::vehicle::rigid`]: x to the nose, moments about x roll, y pitch, z yaw. The middles of the closed fins are
-//! 45 degrees from the y axis, so that the four quarters close into a cylinder. The hinge is 15
-//! degrees off the fin's middle, towards the y axis ("the fins' links are rotated at an angle of 15
-//! degrees", section 2.1): an open fin stands at its hinge, 30 degrees from y, and its skin reaches
-//! further to one side of it. From that comes its lift: a fin hinged at its middle has none. Seen
+//! which is no angle.) Body axes are those of [`crate::vehicle::rigid`]: x to the nose, moments
+//! about x roll, y pitch, z yaw. The middles of the closed fins are 45 degrees from the y axis, so
+//! that the four quarters close into a cylinder. The hinge is 15 degrees off the fin's middle,
+//! towards the y axis ("the fins' links are rotated at an angle of 15 degrees", section 2.1): an
+//! open fin stands at its hinge, 30 degrees from y, and its skin reaches further to one side of it.
+//! From that comes its lift: a fin hinged at its middle has none. Seen
 //! along the body, an open fin `i` is at
 //!
 //! ```text

@@ -1,7 +1,8 @@
 //! The Newton step by one backward and one forward sweep over the stages.
 //!
 //! ```text
-//! minimise    sum over the nodes of (dx' W_k dx / 2 + s_k' dx) + (curvature and input terms of every interval)
+//! minimise    sum over the nodes of (dx' W_k dx / 2 + s_k' dx)
+//!             + (curvature and input terms of every interval)
 //! subject to  dx_{k+1} = A_k dx_k + B_k du_k + r_k,   dx_0 = 0
 //! ```
 //!

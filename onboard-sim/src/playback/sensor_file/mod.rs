@@ -9,13 +9,13 @@
 //! | `gyro_x`, `gyro_y`, `gyro_z` | rotation rate, rad/s, axes of the inertial unit |
 //! | `accel_x`, `accel_y`, `accel_z` | specific force, m/s^2, the same axes: +9.8 upwards at rest |
 //! | `barometer` | height above the pad, m |
-//! | `pressure_pa` | static pressure, Pa, where `barometer` has no sample; the first one is the pad's |
+//! | `pressure_pa` | static pressure, Pa, where `barometer` has no sample; the first is the pad's |
 //! | `gnss_x`, `gnss_y`, `gnss_z` | position from the pad, m; x and y level, z up, right-handed |
 //! | `gnss_vx`, `gnss_vy`, `gnss_vz` | velocity, m/s, the same axes |
 //! | `gnss_time_s` | time of validity of the fix, s, as `time_s`; without it the time of its row |
 //! | `lidar` | range along the tail, m |
 //! | `satellites` | number of satellites of the fix |
-//! | `gnss_horizontal_m`, `gnss_vertical_m` | standard deviations of the fix as the receiver reports them, m |
+//! | `gnss_horizontal_m`, `gnss_vertical_m` | standard deviations of the fix, by the receiver, m |
 //! | `gnss_speed_m_s` | standard deviation of its velocity, m/s |
 
 use std::io::Read;

@@ -3,11 +3,11 @@
 use flight::vehicles::mission::BUILTIN;
 
 use crate::cli::Answer as _;
-use crate::compare::compared;
 use crate::info::{Info, Profile};
-use crate::log::{Clock, ClockTime};
+use crate::log::{Clock, ClockTime, differing};
 use crate::report::html::{escaped, paragraph, table};
 use crate::report::track::Flight;
+use crate::settings::settings_of_mission;
 
 /// The description of the log by `info`.
 pub(super) fn described(info: &Info) -> String {
@@ -45,13 +45,12 @@ pub(super) fn mission(flight: &Flight, info: &Info) -> Option<String> {
     let Some((_, built_in)) = BUILTIN.iter().find(|(known, _)| *known == name) else {
         return Some(controller + &paragraph(&format!("No mission {name} is built into this program.")));
     };
-    let [built_in, flown] = [built_in, flown].map(|text| (name.to_owned(), text.to_owned()));
-    let differences = compared(built_in, flown).ok()?;
+    let differences = differing(&settings_of_mission(built_in)?, &settings_of_mission(flown)?);
     if differences.is_empty() {
         return Some(paragraph(&format!("As the built-in {name}.")));
     }
     let words = |value: Option<String>| escaped(&value.unwrap_or_else(|| "absent".to_owned()));
     let rows = differences.into_iter();
-    let rows = rows.map(|differs| [escaped(&differs.setting), words(differs.baseline), words(differs.other)]);
+    let rows = rows.map(|(setting, [built_in, flown])| [escaped(&setting), words(built_in), words(flown)]);
     Some(controller + &table(&["value", "built-in", "flown"], rows))
 }

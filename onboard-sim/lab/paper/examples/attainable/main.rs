@@ -29,7 +29,8 @@
 //! fall is possible.
 //!
 //! ```text
-//! cargo run --release -p paper --example attainable -- --mission mk2 --dispersion real --seed 2002 --flights 100
+//! cargo run --release -p paper --example attainable -- --mission mk2 --dispersion real \
+//!     --seed 2002 --flights 100
 //! ```
 
 #[cfg(test)]

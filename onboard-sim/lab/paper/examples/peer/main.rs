@@ -6,13 +6,15 @@
 //! height are limited at the end), N = 50.
 //!
 //! ```text
-//! penalty PENALTY              what a metre of missed end height costs from now on; a high penalty makes it a hard condition
+//! penalty PENALTY          what a metre of missed end height costs from now on; a high penalty
+//!                          makes it a hard condition
 //! cold both STATE          solve the whole horizon from the solver's own two bent guesses
 //! cold 0|1 STATE           solve it from one of them
 //! hold                     make the last solution the plan
-//! warm SAMPLES CAP STATE   solve what is left SAMPLES after the plan began, warm-started with the plan, in at most CAP
-//!                          iterations
-//! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at its beginning
+//! warm SAMPLES CAP STATE   solve what is left SAMPLES after the plan began, warm-started with the
+//!                          plan, in at most CAP iterations
+//! space cold RATIO STATE   solve a landing in space (`space`), with RATIO of thrust to weight at
+//!                          its beginning
 //! space hold               make that solution the plan in space
 //! space warm SAMPLES STATE solve what is left of it
 //! quadratic STATE          the problem of one Gauss-Newton step (`quadratic`) at the plan

@@ -1,13 +1,19 @@
-//! Writes tables into files: comma-separated values (RFC 4180), numbers in the shortest form that
-//! reads back as the same.
+//! Writes the content of a log as tables for other programs: comma-separated values (RFC 4180), one
+//! file a table ([`table`](crate::table)), numbers in the shortest form that reads back as the
+//! same.
+//!
+//! A separate program exports to Rerun, because Rerun costs more to compile than all the rest.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use protocol::program::Exit;
 use serde::Serialize;
 
+use crate::cli::{Answer, give, warn_of_loss};
 use crate::log::FlightLog;
 use crate::output::{NewFile, WriteError, new_folder};
 use crate::table::{Cell, TableReader, TableShape};
@@ -30,10 +36,10 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
     // behind.
     let mut folder = None;
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
-    TableReader::new().read::<R, anyhow::Error>(log, |shape, row| {
+    TableReader::default().read::<R, anyhow::Error>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
-            std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
-            std::collections::btree_map::Entry::Vacant(entry) => {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => {
                 let (folder, _held) = match &folder {
                     Some(made) => made,
                     None => folder.insert(new_folder(directory)?),
@@ -51,12 +57,8 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
         Ok((file, written))
     });
     let whole: Vec<(ExportedFile, NewFile)> = finished.collect::<Result<_>>()?;
-    let mut files = Vec::new();
-    for (file, written) in whole {
-        written.commit()?;
-        files.push(file);
-    }
-    Ok(files)
+    let named = whole.into_iter().map(|(file, written)| written.commit().map(|_| file));
+    Ok(named.collect::<Result<_, WriteError>>()?)
 }
 
 fn create(folder: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Writer<NewFile>)> {
@@ -73,6 +75,34 @@ fn text_of(cell: &Cell) -> String {
         Cell::Integer(number) => number.to_string(),
         Cell::Text(text) => text.clone(),
         Cell::Absent => String::new(),
+    }
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct Args {
+    /// The log, an MCAP file.
+    file: PathBuf,
+    /// The directory to write: one file for each table.
+    #[arg(long, short, alias = "output", value_name = "PATH")]
+    out: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Args {
+    pub(crate) fn run(self) -> Result<Exit> {
+        let mut log = FlightLog::open(&self.file)?;
+        let files = export_tables(&mut log, &self.out)?;
+        let outcome = give(&files, self.json)?;
+        warn_of_loss(log.name(), log.damage().map(ToString::to_string).as_deref(), None);
+        Ok(outcome)
+    }
+}
+
+impl Answer for ExportedFile {
+    fn sentences(&self) -> Vec<String> {
+        vec![format!("{}: {} rows of {} columns", self.path.display(), self.rows, self.columns)]
     }
 }
 
