@@ -171,7 +171,7 @@ fn a_program_without_a_session_arms_only_the_boot_that_it_names() {
     let theirs = || Program::new(254, 0, 2, None);
     let real = VehicleEndpoint::new(VehicleKind::Real);
     for mut range in
-        [Range::without_operators(vec![theirs(), ours()]), Range::of(rocket(), real, vec![theirs()])]
+        vec![Range::without_operators(vec![theirs(), ours()]), Range::of(rocket(), real, vec![theirs()])]
     {
         for (command, param1) in MOVING {
             let unnamed = range.programs[0].request(command, param1, 0, 0.0);
