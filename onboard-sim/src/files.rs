@@ -1,9 +1,10 @@
 //! Texts that are built in or files; and files written atomically: each is complete or absent.
 //! Existing files are preserved: a new file or folder gets the next free name.
 
-use std::fs::{File, TryLockError};
+use std::fs::{File, Permissions, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::os::fd::AsFd as _;
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use protocol::log::recorder::{is_device, other_name, under_free_name};
@@ -184,14 +185,9 @@ impl Seek for NewFile {
 /// A file beside another, removed unless it is persisted.
 fn unfinished(beside: &Path) -> io::Result<NamedTempFile> {
     let mut unfinished = tempfile::Builder::new();
-    unfinished.prefix(".unfinished-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The user's umask applies as to any new file; a temporary file would be readable by its
-        // owner only.
-        unfinished.permissions(std::fs::Permissions::from_mode(0o666));
-    }
+    // The user's umask applies as to any new file; a temporary file would be readable by its owner
+    // only.
+    unfinished.prefix(".unfinished-").permissions(Permissions::from_mode(0o666));
     let folder = beside.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     unfinished.tempfile_in(folder)
 }

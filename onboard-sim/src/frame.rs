@@ -126,9 +126,7 @@ pub fn changed(recipe: &Recipe, motor: &str, mass: &Mass) -> Result<Recipe, Fram
         text.remove("lot");
         text.remove("other_motors");
     }
-    let mission_toml = text.to_string();
-    let mission = flight::vehicles::mission::from_toml(&mission_toml, &recipe.mission.name)?;
-    Ok(Recipe { mission, mission_toml, ..recipe.clone() })
+    Ok(recipe.clone().with_mission(text.to_string())?)
 }
 
 #[cfg(test)]

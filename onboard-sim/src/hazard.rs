@@ -303,13 +303,11 @@ pub fn study(
     let (surveyed, more) = (survey as usize * cases.len(), (of_widest - survey) as usize);
     let fly_some = |cases: &[Case], numbers: core::ops::Range<u64>, show: &(dyn Fn(usize) + Sync)| {
         let numbers: Vec<u64> = numbers.collect();
-        let flown =
-            in_parallel(&numbers, |number| fly(recipe, cases, *number), &|flown| show(flown * cases.len()));
-        let flown = numbers
-            .iter()
-            .zip(flown)
-            .map(|(number, flown)| flown.map_err(|source| RunError::Fly { number: *number, source }));
-        Ok::<_, RunError>(flown.collect::<Result<Vec<_>, _>>()?.concat())
+        let one = |number: &u64| {
+            fly(recipe, cases, *number).map_err(|source| RunError::Fly { number: *number, source })
+        };
+        let flown = in_parallel(&numbers, one, &|flown| show(flown * cases.len()));
+        Ok::<_, RunError>(flown.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     };
     done(0, surveyed + more);
     let mut impacts = fly_some(&cases, 0..survey, &|flown| done(flown, surveyed + more))?;
@@ -351,7 +349,8 @@ pub fn fly(recipe: &Recipe, cases: &[Case], number: u64) -> Result<Vec<Impact>, 
     };
     let (alone, beside): (Vec<Case>, Vec<Case>) = cases.iter().partition(|case| case.is_alone());
     if !beside.is_empty() {
-        let mut branches: Vec<Branch> = beside.iter().map(|case| Branch::new(*case)).collect();
+        let begin = |case: &Case| Branch { case: *case, aborted: None, frames: 0 };
+        let mut branches: Vec<Branch> = beside.iter().map(begin).collect();
         let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
         let mut flight = Sortie::new(recipe, number)?;
         let (mut attached, mut booster) = (flight.world().booster_attached(), None);
@@ -418,10 +417,6 @@ struct Branch {
 }
 
 impl Branch {
-    fn new(case: Case) -> Self {
-        Self { case, aborted: None, frames: 0 }
-    }
-
     /// Retains this frame or the stored one, with equal probability for all (J. S. Vitter, Random
     /// Sampling with a Reservoir, 1985). At apogee the first one is retained.
     fn take(&mut self, flight: &Sortie, chance: &mut Chance) {

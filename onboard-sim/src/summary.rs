@@ -232,15 +232,6 @@ pub fn to_markdown(summary: &Summary) -> String {
     format!("# {mission}\n\nProgram `{build}`.\n\n```\n{}```\n", to_text(summary))
 }
 
-fn what(manifest: &Manifest) -> String {
-    let mut what =
-        format!("{}, dispersion {}, seed {}", manifest.mission, manifest.dispersion, manifest.seed);
-    if !manifest.faults.is_empty() {
-        what = format!("{what}, faults {}", manifest.faults.join(" "));
-    }
-    what
-}
-
 /// As much as fits into 80 columns; the summary has the other percentiles.
 fn write_distributions(summary: &Summary, out: &mut String) -> fmt::Result {
     let heading = ["least", "5 %", "50 %", "95 %", "greatest"];
@@ -282,7 +273,9 @@ fn write_text(summary: &Summary, out: &mut String) -> fmt::Result {
         "{} of {of} flights stand undamaged, {inside} touch down inside their envelope.",
         stands.count
     )?;
-    writeln!(out, "{}", what(&summary.manifest))?;
+    let Manifest { mission, dispersion, seed, faults, .. } = &summary.manifest;
+    let faults = if faults.is_empty() { String::new() } else { format!(", faults {}", faults.join(" ")) };
+    writeln!(out, "{mission}, dispersion {dispersion}, seed {seed}{faults}")?;
     for (word, share) in Landing::WORDS.iter().zip(summary.landings.shares()) {
         writeln!(out, "{word:<38}  {share}")?;
     }

@@ -8,7 +8,7 @@ use sim::outcome::by_envelope;
 use sim::outside::{Outside, Unwatched, Watch};
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
-use sim::world::{FirstContact, RestOutcome};
+use sim::world::FirstContact;
 
 use crate::row::Row;
 
@@ -161,7 +161,7 @@ impl Tally {
             envelope: landing.envelope,
             table_2: landing.table_2,
             failure: outcome.failure.map_or("", |failure| failure.name()).to_owned(),
-            rest: outcome.rest.map_or("", |rest| rest_name(rest.outcome)).to_owned(),
+            rest: outcome.rest.map_or("", |rest| rest.outcome.name()).to_owned(),
             stroke_used: strain.map(|strain| strain.stroke_used),
             strength_used: strain.map(|strain| strain.strength_used),
             clearance_m: strain.map(|strain| strain.clearance_m),
@@ -195,12 +195,4 @@ pub fn fly(recipe: &Recipe, number: u64) -> Result<Row, SetUpError> {
     let mut tally = Tally::new(recipe, number)?;
     while tally.step() {}
     Ok(tally.row())
-}
-
-fn rest_name(rest: RestOutcome) -> &'static str {
-    match rest {
-        RestOutcome::Upright => "upright",
-        RestOutcome::TippedOver => "tipped over",
-        RestOutcome::BodyStrike => "body strike",
-    }
 }

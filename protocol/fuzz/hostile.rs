@@ -65,8 +65,8 @@ pub fn stream(data: &[u8]) {
 /// # Panics
 /// A frame changes when it is framed again, or a text contains a control character.
 pub fn frames(data: &[u8]) {
-    let mut texts = Reassembler::new();
-    let mut stats = LinkStats::new();
+    let mut texts = Reassembler::default();
+    let mut stats = LinkStats::default();
     let mut sender = CommandSender::new(0);
     let (mut files, mut download) = (Server::default(), Download::new(None, 0));
     let mut rest = data;

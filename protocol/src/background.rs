@@ -50,11 +50,13 @@ struct Queue<T, O> {
     ends: bool,
 }
 
-impl<T: Ord, O> Shared<T, O> {
+impl<T, O> Shared<T, O> {
     fn queue(&self) -> MutexGuard<'_, Queue<T, O>> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
 
+impl<T: Ord, O> Shared<T, O> {
     /// Waits for the most urgent job; `None` at the end.
     fn next(&self) -> Option<Job<O>> {
         let mut queue = self.queue();
@@ -103,13 +105,6 @@ impl<T: Ord + Send + 'static, O: Send + 'static> Background<T, O> {
         self.outcomes.try_recv().ok()
     }
 
-    /// Waits until no job waits or runs, at most so long. Returns whether that is so.
-    pub fn wait(&self, longest: Duration) -> bool {
-        let is_busy = |queue: &mut Queue<T, O>| !queue.jobs.is_empty() || queue.runs;
-        let waited = self.shared.changed.wait_timeout_while(self.shared.queue(), longest, is_busy);
-        !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
-    }
-
     /// Waits until every queued job has run. Returns the outcomes that are still unread.
     pub fn finish(mut self) -> Vec<O> {
         self.end();
@@ -121,8 +116,15 @@ impl<T: Ord + Send + 'static, O: Send + 'static> Background<T, O> {
 }
 
 impl<T, O> Background<T, O> {
+    /// Waits until no job waits or runs, at most so long. Returns whether that is so.
+    pub fn wait(&self, longest: Duration) -> bool {
+        let is_busy = |queue: &mut Queue<T, O>| !queue.jobs.is_empty() || queue.runs;
+        let waited = self.shared.changed.wait_timeout_while(self.shared.queue(), longest, is_busy);
+        !waited.unwrap_or_else(PoisonError::into_inner).1.timed_out()
+    }
+
     fn end(&self) {
-        self.shared.queue.lock().unwrap_or_else(PoisonError::into_inner).ends = true;
+        self.shared.queue().ends = true;
         self.shared.changed.notify_all();
     }
 }
@@ -137,10 +139,8 @@ impl<T, O> Drop for Background<T, O> {
     /// Waits for the last jobs, as long as a disk may stall.
     fn drop(&mut self) {
         self.end();
-        let left = self.shared.queue.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_busy = |queue: &mut Queue<T, O>| !queue.jobs.is_empty() || queue.runs;
         if self.thread.is_some() {
-            drop(self.shared.changed.wait_timeout_while(left, ENDS_WITHIN, is_busy));
+            self.wait(ENDS_WITHIN);
         }
     }
 }

@@ -21,6 +21,7 @@ use crate::dialect::TD_BOOK_HEAD_DATA;
 use crate::identity::Address;
 use crate::log::v1;
 use crate::signing::Key;
+pub use crate::text::shown;
 
 pub type Hash = [u8; 32];
 
@@ -104,13 +105,6 @@ impl Book {
         let book = self.head.map_or(name, |head| head.book);
         *self.head.insert(Head { book, entries: entry.number.saturating_add(1), hash })
     }
-}
-
-/// The beginning of a hash in groups of four digits, to be compared by eye.
-pub fn shown(hash: &[u8]) -> String {
-    let (pairs, _) = hash.as_chunks::<2>();
-    let groups: Vec<String> = pairs.iter().take(8).map(|[a, b]| format!("{a:02x}{b:02x}")).collect();
-    groups.join("-")
 }
 
 impl SignedHead {

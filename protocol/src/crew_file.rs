@@ -4,7 +4,7 @@
 //! The vehicle reads all keys. A station reads its operator's only, so the others need not be
 //! present.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -127,14 +127,8 @@ impl CrewFile {
                 return Err(format!("`{}` and `{}` both have link = {number}", other.name, member.name));
             }
         }
-        let mut roles: Vec<u8> = self
-            .members
-            .iter()
-            .filter(|member| member.key.is_some())
-            .map(|member| member.role as u8)
-            .collect();
-        roles.sort_unstable();
-        roles.dedup();
+        let with_keys = self.members.iter().filter(|member| member.key.is_some());
+        let roles: BTreeSet<u8> = with_keys.map(|member| member.role as u8).collect();
         let needed = if self.mode == Mode::TwoPerson { 2 } else { 1 };
         if roles.len() < needed {
             let words = "needs operators with keys of at least";

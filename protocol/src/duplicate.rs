@@ -66,10 +66,6 @@ struct Source {
 }
 
 impl Duplicates {
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Notes a frame that this operator has signed (0: the shared key, or none) and returns how it
     /// has arrived. No sender can turn the frame of another one into a copy. Over a link from the
     /// 65th on nothing is a copy.
@@ -125,7 +121,7 @@ mod tests {
         let mut encoder = Encoder::new(VEHICLE);
         let mut beat = || encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
         let (first, second) = (beat(), beat());
-        let mut duplicates = Duplicates::new();
+        let mut duplicates = Duplicates::default();
         let at = |ms| Duration::from_millis(ms);
         assert!(!is_copy(&mut duplicates, &first, 0, 0, at(0)));
         assert!(!is_copy(&mut duplicates, &second, 0, 1, at(10)), "it is another frame");
@@ -146,7 +142,7 @@ mod tests {
     #[test]
     fn a_repeated_sequence_number_is_no_copy() {
         let mut encoder = Encoder::new(VEHICLE);
-        let mut duplicates = Duplicates::new();
+        let mut duplicates = Duplicates::default();
         for frame in 0..1_000 {
             let beat = encoder.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             assert!(
@@ -167,7 +163,7 @@ mod tests {
                 encoder.encode(&MavMessage::HEARTBEAT(beat))
             })
             .collect();
-        let mut duplicates = Duplicates::new();
+        let mut duplicates = Duplicates::default();
         for link in 0..3 {
             for (nth, frame) in frames.iter().enumerate() {
                 let now = Duration::from_secs(link as u64);
@@ -182,7 +178,7 @@ mod tests {
 
     #[test]
     fn a_flood_of_forged_ids_does_not_fill_the_memory() {
-        let mut duplicates = Duplicates::new();
+        let mut duplicates = Duplicates::default();
         for system_id in 1..=255 {
             let source = Address { system_id, component_id: 1 };
             let frame = Encoder::new(source).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));

@@ -141,10 +141,6 @@ pub struct SourceFigures {
 }
 
 impl LinkStats {
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Counts bytes that arrived, whether or not they belong to a frame.
     pub fn on_rx_bytes(&mut self, count: usize, now: Duration) {
         self.bucket(now).rx_bytes += count as u64;

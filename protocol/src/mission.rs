@@ -4,6 +4,9 @@ use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
+use crate::command::whole_in;
+use crate::text::shown;
+
 /// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it,
 /// including comments, except the line with the start of the flight (`at` in `[start]`): that is
 /// chosen for each flight (`--start`). 64 bits distinguish missions; they do not protect against a
@@ -64,12 +67,8 @@ impl Expected {
         for (place, param) in (0..).zip(params) {
             // The last parameter has the 20 bits that are left.
             let most = (u64::MAX >> (BITS_A_PARAM * place)) & MASK;
-            if !((1.0..=most as f32 + 1.0).contains(&param)
-                && libm::truncf(param).to_bits() == param.to_bits())
-            {
-                return Self::Unreadable;
-            }
-            bits |= (param as u64 - 1) << (BITS_A_PARAM * place);
+            let Some(part) = whole_in(param, 1..=most as u32 + 1) else { return Self::Unreadable };
+            bits |= u64::from(part - 1) << (BITS_A_PARAM * place);
         }
         Self::Hash(MissionHash(bits.to_le_bytes()))
     }
@@ -78,11 +77,7 @@ impl Expected {
 /// Sixteen hexadecimal digits in groups of four, to be read aloud.
 impl fmt::Display for MissionHash {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (place, pair) in self.0.chunks_exact(2).enumerate() {
-            let gap = if place == 0 { "" } else { "-" };
-            write!(out, "{gap}{:02x}{:02x}", pair[0], pair[1])?;
-        }
-        Ok(())
+        out.write_str(&shown(&self.0))
     }
 }
 

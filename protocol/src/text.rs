@@ -5,8 +5,8 @@
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
-use alloc::vec;
 use alloc::vec::Vec;
+use alloc::{format, vec};
 use core::time::Duration;
 
 use mavlink::types::CharArray;
@@ -75,10 +75,6 @@ impl Reassembler {
     /// first.
     pub const MAX_PARTIAL: usize = 16;
 
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Takes a chunk and returns the texts that are ready.
     pub fn push(&mut self, source: Address, chunk: &STATUSTEXT_DATA, now: Duration) -> Vec<Text> {
         let bytes: &[u8; CHUNK_LEN] = &chunk.text;
@@ -120,19 +116,10 @@ impl Reassembler {
 
     /// Returns the texts that have waited too long for a chunk.
     pub fn expire(&mut self, now: Duration) -> Vec<Text> {
-        let mut late = Vec::new();
-        let keys: Vec<_> = self
-            .partial
-            .iter()
-            .filter(|(_, partial)| now.saturating_sub(partial.first_seen) > REASSEMBLY_TIMEOUT)
-            .map(|(key, _)| *key)
-            .collect();
-        for key in keys {
-            if let Some(partial) = self.partial.remove(&key) {
-                late.push(partial.into_text(key.0));
-            }
-        }
-        late
+        let is_late =
+            |_: &_, partial: &mut Partial| now.saturating_sub(partial.first_seen) > REASSEMBLY_TIMEOUT;
+        let late = self.partial.extract_if(.., is_late);
+        late.map(|((source, _), partial)| partial.into_text(source)).collect()
     }
 }
 
@@ -162,6 +149,13 @@ pub fn printable(bytes: &[u8]) -> String {
         .chars()
         .map(|c| if c.is_control() || is_bidi_control(c) { char::REPLACEMENT_CHARACTER } else { c })
         .collect()
+}
+
+/// The beginning of a hash in groups of four digits, to be compared by eye and read aloud.
+pub fn shown(hash: &[u8]) -> String {
+    let (pairs, _) = hash.as_chunks::<2>();
+    let groups: Vec<String> = pairs.iter().take(8).map(|[a, b]| format!("{a:02x}{b:02x}")).collect();
+    groups.join("-")
 }
 
 /// Characters that change the order of the text around them (Unicode UAX #9).

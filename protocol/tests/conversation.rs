@@ -18,7 +18,7 @@ fn ms(milliseconds: u64) -> Duration {
 }
 
 fn answer(command: MavCmd, result: MavResult) -> CommandAnswer {
-    CommandAnswer { command: command as u16, result: result as u8, progress: 0, detail: 0, target: GROUND }
+    CommandAnswer { command: command as u16, result: result as u8, detail: 0, target: GROUND }
 }
 
 /// Polls for `seconds` without an answer; returns the times of sending and the events.
@@ -108,7 +108,7 @@ fn a_missing_chunk_is_marked_after_the_timeout() {
     let text = "a".repeat(50) + &"b".repeat(50) + &"c".repeat(20);
     let parts = chunks(MavSeverity::MAV_SEVERITY_WARNING, &text, 7);
     assert_eq!(parts.len(), 3);
-    let mut reassembler = Reassembler::new();
+    let mut reassembler = Reassembler::default();
     assert!(reassembler.push(VEHICLE, &parts[2], ms(0)).is_empty());
     assert!(reassembler.push(VEHICLE, &parts[0], ms(10)).is_empty());
     assert!(reassembler.expire(ms(1_900)).is_empty());
@@ -119,7 +119,7 @@ fn a_missing_chunk_is_marked_after_the_timeout() {
 
 #[test]
 fn a_flood_of_unfinished_texts_stays_bounded() {
-    let mut reassembler = Reassembler::new();
+    let mut reassembler = Reassembler::default();
     let mut shown = 0;
     for id in 1..=1_000 {
         let parts = chunks(MavSeverity::MAV_SEVERITY_INFO, &"x".repeat(120), id);
@@ -134,7 +134,7 @@ fn heartbeats(encoder: &mut Encoder, count: usize) -> Vec<Frame> {
 
 #[test]
 fn loss_and_rate_are_those_of_the_last_ten_seconds() {
-    let mut stats = LinkStats::new();
+    let mut stats = LinkStats::default();
     let mut encoder = Encoder::new(VEHICLE);
     // Ten frames a second arrive for 30 s; every fifth is lost during the last ten.
     for (k, frame) in heartbeats(&mut encoder, 300).iter().enumerate() {
@@ -155,7 +155,7 @@ fn loss_and_rate_are_those_of_the_last_ten_seconds() {
 
 #[test]
 fn each_component_has_a_loss_and_each_message_an_age_and_a_rate() {
-    let mut stats = LinkStats::new();
+    let mut stats = LinkStats::default();
     let (vehicle, ground) =
         (heartbeats(&mut Encoder::new(VEHICLE), 100), heartbeats(&mut Encoder::new(GROUND), 100));
     for (k, (of_vehicle, of_ground)) in vehicle.iter().zip(&ground).enumerate() {
@@ -182,7 +182,7 @@ fn each_component_has_a_loss_and_each_message_an_age_and_a_rate() {
 #[test]
 fn a_frame_that_arrives_late_is_not_lost() {
     let frames = heartbeats(&mut Encoder::new(VEHICLE), 20);
-    let mut stats = LinkStats::new();
+    let mut stats = LinkStats::default();
     for place in [0, 1, 3, 2, 4, 7, 5, 6, 8] {
         stats.on_frame(&frames[place], ms(10 * place as u64));
     }
@@ -191,7 +191,7 @@ fn a_frame_that_arrives_late_is_not_lost() {
 
 #[test]
 fn a_restarted_sender_is_not_taken_for_loss() {
-    let mut stats = LinkStats::new();
+    let mut stats = LinkStats::default();
     for frame in heartbeats(&mut Encoder::new(VEHICLE), 200) {
         stats.on_frame(&frame, ms(0));
     }
@@ -213,7 +213,7 @@ proptest! {
         let mut parts = chunks(MavSeverity::MAV_SEVERITY_NOTICE, &text, id);
         let turn = order.index(parts.len());
         parts.rotate_left(turn);
-        let mut reassembler = Reassembler::new();
+        let mut reassembler = Reassembler::default();
         let shown: Vec<_> = parts.iter().flat_map(|part| reassembler.push(VEHICLE, part, ms(0))).collect();
         prop_assert_eq!(shown.len(), 1);
         prop_assert_eq!(&shown[0].text, &text);

@@ -105,19 +105,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 return Err((steps, sweeps));
             }
             if settled && residual <= tolerance {
-                let residual = self.settle(model);
+                let (residual, status) = (self.settle(model), Status::Converged);
                 let close = residual.largest(0.0) <= tolerance;
-                return if close {
-                    Ok(SolveEnd {
-                        status: Status::Converged,
-                        iterations: steps,
-                        sweeps,
-                        residual,
-                        ..SolveEnd::BAD
-                    })
-                } else {
-                    Err((steps, sweeps))
-                };
+                let end = SolveEnd { status, iterations: steps, sweeps, residual, ..SolveEnd::BAD };
+                return if close { Ok(end) } else { Err((steps, sweeps)) };
             }
             if self.allowance.is_spent() {
                 return Err((steps, sweeps));

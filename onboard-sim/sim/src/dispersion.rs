@@ -1,6 +1,7 @@
 //! The uncertain values of a flight, as data.
 
 use crate::world::sensors::SensorParams;
+use flight::vehicles::file_error::FileError;
 use serde::Deserialize;
 
 /// A set of dispersions. Each value is the standard deviation of a normal distribution unless its
@@ -143,13 +144,8 @@ pub fn may_be_kinder(name: &str) -> bool {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DispersionError {
     /// The text is not a set of dispersions.
-    #[error("{origin}: {message}")]
-    Parse {
-        /// Where the text came from.
-        origin: String,
-        /// The parser's words.
-        message: String,
-    },
+    #[error(transparent)]
+    File(#[from] FileError),
     /// No built-in set has this name.
     #[error("no dispersion is named '{name}'; these are built in: {available}")]
     Unknown {
@@ -164,10 +160,10 @@ impl Dispersion {
     /// Reads a set from TOML; `origin` names it in messages.
     ///
     /// # Errors
-    /// [`DispersionError::Parse`] names the key.
+    /// [`DispersionError::File`] names the key.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, DispersionError> {
-        toml::from_str(text)
-            .map_err(|error| DispersionError::Parse { origin: origin.to_owned(), message: error.to_string() })
+        let read = toml::from_str(text);
+        Ok(read.map_err(|error| FileError::Parse { origin: origin.to_owned(), message: error.to_string() })?)
     }
 
     /// The built-in set of a name.

@@ -63,6 +63,14 @@ impl Recipe {
     /// The mission lacks the data of that start.
     pub fn starting_at(self, start: StartPoint) -> Result<Self, RecipeError> {
         let mission_toml = toml_starting_at(&self.mission_toml, &self.mission.name, start)?;
+        Ok(self.with_mission(mission_toml)?)
+    }
+
+    /// This recipe with another text of its mission.
+    ///
+    /// # Errors
+    /// The text is no mission.
+    pub fn with_mission(self, mission_toml: String) -> Result<Self, MissionError> {
         let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
         Ok(Self { mission, mission_toml, ..self })
     }
@@ -74,9 +82,7 @@ impl Recipe {
     pub fn counting_down(self, countdown_s: f64) -> Result<Self, RecipeError> {
         let mut document = document_of(&self.mission_toml, &self.mission.name)?;
         document["start"]["countdown_s"] = toml_edit::value(countdown_s);
-        let mission_toml = document.to_string();
-        let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
-        Ok(Self { mission, mission_toml, ..self })
+        Ok(self.with_mission(document.to_string())?)
     }
 
     /// This recipe with an ascent motor of the same impulse that burns for another time, s.
@@ -91,9 +97,7 @@ impl Recipe {
         let stretched = curve.scaled(1.0, burn_time_s / curve.burn_time_s());
         let mut document = document_of(&self.mission_toml, &self.mission.name)?;
         document["launch"]["booster"]["motor"] = toml_edit::value(to_rasp(&stretched));
-        let mission_toml = document.to_string();
-        let mission = flight::vehicles::mission::from_toml(&mission_toml, &self.mission.name)?;
-        Ok(Self { mission, mission_toml, ..self })
+        Ok(self.with_mission(document.to_string())?)
     }
 
     /// A recipe from a built-in mission and a built-in set of dispersions.

@@ -210,14 +210,10 @@ impl Sortie {
             rehearsal.step();
         }
         let from_sensors = self.sense()?;
-        let abort = [Request::of_the_programme(CrewCommand::Abort)];
-        let aborting;
-        let requests = if core::mem::take(&mut self.abort) {
-            aborting = [outside.requests, abort.as_slice()].concat();
-            aborting.as_slice()
-        } else {
-            outside.requests
-        };
+        let mut requests = outside.requests.to_vec();
+        if core::mem::take(&mut self.abort) {
+            requests.push(Request::of_the_programme(CrewCommand::Abort));
+        }
         let sensed = SensedInput {
             pin_out: outside.pin_out,
             log: outside.log,
@@ -228,7 +224,7 @@ impl Sortie {
         };
         let input = Input {
             sensed,
-            requests,
+            requests: &requests,
             rehearsed: self.rehearsal.as_ref().and_then(Rehearsal::over).map(|(rehearsed, _)| rehearsed),
             plan_ready: self.plan_ready_at.take_if(|at| self.frame >= *at).is_some(),
         };

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
+use flight::computer::messages::CrewMessage;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::StartPoint;
 use protocol::background::survive_file_size_limit;
@@ -281,9 +282,11 @@ fn read_pin(pin: &watch::Sender<bool>) {
 
 fn report_event(time_s: f64, event: &VehicleEvent) {
     let words = match event {
-        VehicleEvent::Text { text, .. } => text.clone(),
-        VehicleEvent::PhaseChanged { from, to } => format!("phase {} to {}", from.name(), to.name()),
-        VehicleEvent::Planned { .. } | VehicleEvent::Verdict => return,
+        VehicleEvent::Message(CrewMessage::Text { text, .. }) => text.clone(),
+        VehicleEvent::Message(CrewMessage::PhaseChanged { from, to }) => {
+            format!("phase {} to {}", from.name(), to.name())
+        }
+        VehicleEvent::Planned(_) | VehicleEvent::Verdict => return,
     };
     // A closed pipe must not end a flight.
     let _ = writeln!(std::io::stdout(), "{time_s:8.2} s  {words}");

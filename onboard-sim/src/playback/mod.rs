@@ -9,7 +9,6 @@
 mod axes;
 pub mod sensor_file;
 
-use flight::computer::messages::CrewMessage;
 use flight::computer::{Computer, FRAME_S, Input, LogState, Output, SensedInput, flight_time_s};
 use flight::estimation::estimator::{Aids, Measurements};
 use flight::estimation::sensor_watch::SENSORS;
@@ -98,10 +97,7 @@ pub fn play(sensors: &[Measurements], mission: &Mission, mut log: impl FnMut(Rec
     for frame in 1..=sensors.len() as u64 {
         let (before, flies) = (player.computer.mode().phase, player.computer.released_at_s().is_some());
         let output = player.step(frame, &mut last);
-        let messages = output.messages.iter().map(|message| match message {
-            CrewMessage::Text { severity, text } => record::text_event(*severity, text),
-            CrewMessage::PhaseChanged { from, to } => record::phase_event(*from, *to),
-        });
+        let messages = output.messages.iter().map(record::message_event);
         let records = last.take().map(Record::ComputerFrame).into_iter();
         let records = records.chain(output.released.then(|| start(&player.computer))).chain(messages);
         let estimate = flies.then(|| record::estimate(player.computer.pilot())).flatten();

@@ -6,6 +6,8 @@
 
 mod sender;
 
+use core::ops::RangeInclusive;
+
 use crate::dialect::{MavCmd, MavResult};
 use crate::frame::{Encoder, Frame};
 use crate::identity::{Address, LARGEST_BOOT_NUMBER};
@@ -92,14 +94,9 @@ impl CommandRequest {
     pub fn addressed_boot(&self) -> AddressedBoot {
         let param7 = self.params[6];
         if param7.is_nan() || param7.abs() < 0.5 {
-            AddressedBoot::Any
-        } else if (1.0..=LARGEST_BOOT_NUMBER as f32).contains(&param7)
-            && libm::truncf(param7).to_bits() == param7.to_bits()
-        {
-            AddressedBoot::Boot(param7 as u32)
-        } else {
-            AddressedBoot::Unreadable
+            return AddressedBoot::Any;
         }
+        whole_in(param7, 1..=LARGEST_BOOT_NUMBER).map_or(AddressedBoot::Unreadable, AddressedBoot::Boot)
     }
 
     /// Returns whether the request is this MAV_CMD.
@@ -140,9 +137,13 @@ pub const FIRST_NUMBER: u32 = 65_536;
 const NUMBERS_END: u32 = 1 << 24;
 
 fn number_in(param2: f32) -> Option<u32> {
-    let whole = libm::truncf(param2).to_bits() == param2.to_bits();
-    let fits = (FIRST_NUMBER as f32..NUMBERS_END as f32).contains(&param2);
-    (whole && fits).then_some(param2 as u32)
+    whole_in(param2, FIRST_NUMBER..=NUMBERS_END - 1)
+}
+
+/// The whole number of this range that a parameter contains. A float represents both ends exactly.
+pub fn whole_in(param: f32, range: RangeInclusive<u32>) -> Option<u32> {
+    let fits = (*range.start() as f32..=*range.end() as f32).contains(&param);
+    (fits && libm::truncf(param).to_bits() == param.to_bits()).then_some(param as u32)
 }
 
 /// The boot of a vehicle that a command is addressed to.
@@ -162,8 +163,6 @@ pub struct CommandAnswer {
     pub command: u16,
     /// MAV_RESULT number.
     pub result: u8,
-    /// Percent done while the result is MAV_RESULT_IN_PROGRESS; 255 means unknown.
-    pub progress: u8,
     /// RESULT_PARAM2: the number of the command, negative if a second person must confirm it. For a
     /// command without a number it is the number of the proposal to confirm; 0 if there is none.
     pub detail: i32,
@@ -176,7 +175,6 @@ impl CommandAnswer {
         Self {
             command: request.command,
             result: result as u8,
-            progress: 0,
             detail: request.number().and_then(|number| i32::try_from(number).ok()).unwrap_or(0),
             target: request.source,
         }
@@ -201,21 +199,14 @@ impl CommandAnswer {
 
     /// Encodes the answer as a COMMAND_ACK frame.
     pub fn encode(&self, encoder: &mut Encoder) -> Option<Frame> {
-        let command = self.command.to_le_bytes();
-        let detail = self.detail.to_le_bytes();
+        const PROGRESS: u8 = 0;
         let payload = [
-            command[0],
-            command[1],
-            self.result,
-            self.progress,
-            detail[0],
-            detail[1],
-            detail[2],
-            detail[3],
-            self.target.system_id,
-            self.target.component_id,
+            &self.command.to_le_bytes()[..],
+            &[self.result, PROGRESS],
+            &self.detail.to_le_bytes(),
+            &[self.target.system_id, self.target.component_id],
         ];
-        encoder.encode_payload(COMMAND_ACK_ID, &payload)
+        encoder.encode_payload(COMMAND_ACK_ID, &payload.concat())
     }
 
     /// Parses the answer in a COMMAND_ACK frame; returns `None` for any other message.
@@ -227,7 +218,6 @@ impl CommandAnswer {
         Some(Self {
             command: u16::from_le_bytes([payload[0], payload[1]]),
             result: payload[2],
-            progress: payload[3],
             detail: i32::from_le_bytes([payload[4], payload[5], payload[6], payload[7]]),
             target: Address { system_id: payload[8], component_id: payload[9] },
         })

@@ -51,11 +51,7 @@ pub enum CommandEvent {
         attempt: u32,
     },
     /// Acknowledged as in progress.
-    InProgress {
-        command: u16,
-        /// Percent done; 255 means unknown.
-        progress: u8,
-    },
+    InProgress { command: u16 },
     /// The final answer.
     Answered {
         command: u16,
@@ -314,35 +310,26 @@ impl CommandSender {
         // its numbers are not theirs.
         let of_its_kind = || self.pending.iter().position(|p| p.message.command as u16 == answer.command);
         let Some(index) = waiting.or_else(of_its_kind) else { return false };
-        if self.pending[index].resend == Resend::UntilWithdrawn {
-            self.note_answer(index, *answer, final_answer);
+        let pending = &mut self.pending[index];
+        let CommandAnswer { command, result, .. } = *answer;
+        if pending.resend == Resend::UntilWithdrawn {
+            // It is reported if it differs from the one before. Once accepted the command stays
+            // accepted: copies that arrive later find nothing left to do.
+            if pending.is_accepted() || pending.answered.replace(result) == Some(result) {
+                return true;
+            }
         } else if final_answer {
             self.pending.remove(index);
-            let CommandAnswer { command, result, .. } = *answer;
-            self.events.push(CommandEvent::Answered { command, result, open: answer.is_open() });
         } else {
-            self.pending[index].in_progress = true;
-            self.pending[index].due_at = now + PROGRESS_TIMEOUT;
-            self.events.push(CommandEvent::InProgress { command: answer.command, progress: answer.progress });
+            pending.in_progress = true;
+            pending.due_at = now + PROGRESS_TIMEOUT;
         }
-        true
-    }
-
-    /// Notes an answer to a command that is sent until it is withdrawn, and reports it if it
-    /// differs from the one before. Once accepted it stays accepted: copies that arrive later find
-    /// nothing left to do.
-    fn note_answer(&mut self, index: usize, answer: CommandAnswer, final_answer: bool) {
-        let known = &mut self.pending[index].answered;
-        if *known == Some(answer.result) || *known == Some(MavResult::MAV_RESULT_ACCEPTED as u8) {
-            return;
-        }
-        *known = Some(answer.result);
-        let CommandAnswer { command, result, progress, .. } = answer;
         self.events.push(if final_answer {
             CommandEvent::Answered { command, result, open: answer.is_open() }
         } else {
-            CommandEvent::InProgress { command, progress }
+            CommandEvent::InProgress { command }
         });
+        true
     }
 
     /// Returns whether this command is pending.
@@ -379,8 +366,7 @@ mod tests {
             sender.poll(ms(now));
             for (_, of) in answers_ms.iter().filter(|(at, _)| *at == now) {
                 let detail = FIRST_NUMBER.cast_signed() + 7 + of;
-                let answer =
-                    CommandAnswer { command: ARM as u16, result: 0, progress: 0, detail, target: GROUND };
+                let answer = CommandAnswer { command: ARM as u16, result: 0, detail, target: GROUND };
                 sender.on_answer(&answer, ms(now));
             }
         }
@@ -403,7 +389,7 @@ mod tests {
             sent.extend(sender.poll(ms(now)).iter().map(|_| now));
             for (_, result) in answered.iter().filter(|(at, _)| *at == now) {
                 let (command, result) = (abort as u16, *result as u8);
-                let answer = CommandAnswer { command, result, progress: 0, detail: 0, target: GROUND };
+                let answer = CommandAnswer { command, result, detail: 0, target: GROUND };
                 assert!(sender.on_answer(&answer, ms(now)) || now >= withdrawn_ms);
             }
         }

@@ -9,12 +9,12 @@ use core::time::Duration;
 
 use mavlink::MessageData as _;
 
+use crate::command::CommandRequest;
 use crate::dialect::{
-    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA,
-    EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA,
-    LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA, TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
-    VFR_HUD_DATA,
+    ATTITUDE_DATA, ATTITUDE_QUATERNION_DATA, BATTERY_STATUS_DATA, EXTENDED_SYS_STATE_DATA,
+    GLOBAL_POSITION_INT_DATA, GPS_RAW_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
+    TD_CONTROLLER_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_PREDICTION_DATA, VFR_HUD_DATA,
 };
 use crate::frame::Frame;
 
@@ -75,10 +75,7 @@ enum Rank {
 
 /// The number of the command, if it is one.
 fn command_of(frame: &Frame) -> Option<u16> {
-    matches!(frame.message_id(), COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID).then(|| {
-        let payload = frame.padded_payload();
-        u16::from_le_bytes([payload[28], payload[29]])
-    })
+    CommandRequest::from_frame(frame).map(|request| request.command)
 }
 
 fn rank(frame: &Frame) -> Rank {
@@ -112,8 +109,7 @@ pub(super) struct Line {
     free_at: Duration,
     /// When that is paid for out of the budget.
     paid_at: Duration,
-    /// The share of the budget that the radio leaves, and when it reported last.
-    radio: (f64, Duration),
+    pub(super) radio: RadioShare,
     /// The last frame that left.
     last: Option<Frame>,
     dropped: u64,
@@ -128,7 +124,7 @@ impl Line {
             waiting: VecDeque::new(),
             free_at: Duration::ZERO,
             paid_at: Duration::ZERO,
-            radio: (1.0, Duration::ZERO),
+            radio: RadioShare::default(),
             last: None,
             dropped: 0,
         }
@@ -136,17 +132,6 @@ impl Line {
 
     fn len_of(&self, frame: &Frame) -> usize {
         frame.as_bytes().len() + self.added
-    }
-
-    /// Notes how much of its buffer a radio has free, percent. Below a half it is given less, above
-    /// three quarters more.
-    pub(super) fn on_radio(&mut self, free_percent: u8, now: Duration) {
-        self.radio = (slowed(self.left(now), free_percent), now);
-    }
-
-    fn left(&self, now: Duration) -> f64 {
-        let (left, at) = self.radio;
-        if now.saturating_sub(at) > REPORT_HOLDS { 1.0 } else { left }
     }
 
     /// Queues a frame. Removes frames that it makes obsolete, and telemetry that would wait too
@@ -188,7 +173,7 @@ impl Line {
         let frame = self.waiting.remove(place)?;
         let bytes = self.len_of(&frame) as f64;
         self.free_at = self.free_at.max(now) + Duration::from_secs_f64(bytes / self.bytes_s);
-        let budget = SHARE * self.left(now) * self.bytes_s;
+        let budget = SHARE * self.radio.at(now) * self.bytes_s;
         self.paid_at = self.paid_at.max(now) + Duration::from_secs_f64(bytes / budget);
         self.last = Some(frame.clone());
         Some(frame)
@@ -200,16 +185,28 @@ impl Line {
     }
 }
 
-/// The share of a budget that is used after a radio has reported how much of its buffer is free,
-/// percent. SiK radios report once a second.
-pub fn slowed(share: f64, free_percent: u8) -> f64 {
-    let factor = match free_percent {
-        0..25 => 0.7,
-        25..50 => 0.9,
-        50..75 => 1.0,
-        75.. => 1.15,
-    };
-    (share * factor).clamp(LEAST, 1.0)
+/// The share of a line's budget that its radio leaves, and the time of its last report. SiK radios
+/// report once a second.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RadioShare(Option<(f64, Duration)>);
+
+impl RadioShare {
+    /// Notes how much of its buffer the radio has free, percent. Below a half it is given less,
+    /// above three quarters more.
+    pub fn on_report(&mut self, free_percent: u8, now: Duration) {
+        let factor = match free_percent {
+            0..25 => 0.7,
+            25..50 => 0.9,
+            50..75 => 1.0,
+            75.. => 1.15,
+        };
+        self.0 = Some(((self.at(now) * factor).clamp(LEAST, 1.0), now));
+    }
+
+    /// The share at this time; all of it once the report has expired.
+    pub fn at(self, now: Duration) -> f64 {
+        self.0.filter(|(_, at)| now.saturating_sub(*at) <= REPORT_HOLDS).map_or(1.0, |(share, _)| share)
+    }
 }
 
 #[cfg(test)]
@@ -345,15 +342,15 @@ mod tests {
         let mut line = Line::new(1_000, 0);
         let full = rate(&mut line, 0);
         for second in 10..20 {
-            line.on_radio(5, ms(1_000 * second));
+            line.radio.on_report(5, ms(1_000 * second));
         }
         let least = rate(&mut line, 20);
         assert!((least / full - LEAST).abs() < 0.03, "{least} of {full} B/s");
         for second in 30..45 {
-            line.on_radio(95, ms(1_000 * second));
+            line.radio.on_report(95, ms(1_000 * second));
         }
         assert!(rate(&mut line, 45) > 0.95 * full);
-        line.on_radio(0, ms(60_000));
+        line.radio.on_report(0, ms(60_000));
         assert!(rate(&mut line, 71) > 0.95 * full, "a radio that says nothing any more");
     }
 }

@@ -155,7 +155,7 @@ impl Hub {
     pub fn new(links: usize, signing: Option<Signing>) -> Self {
         Self {
             links: (0..links).map(|_| HubLink::default()).collect(),
-            duplicates: Duplicates::new(),
+            duplicates: Duplicates::default(),
             signing,
         }
     }
@@ -218,7 +218,7 @@ impl Hub {
             && frame.source() == RADIO
             && let Some(line) = &mut self.links[link].line
         {
-            line.on_radio(frame.padded_payload()[TXBUF_AT], now);
+            line.radio.on_report(frame.padded_payload()[TXBUF_AT], now);
         }
         // The signature is checked first: a forged frame must not turn the true one into a copy.
         let operator = self.signing.as_ref().map_or(0, |signing| signing.operator_of(&frame));

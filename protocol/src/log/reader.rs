@@ -137,15 +137,9 @@ pub struct LogReader<R: Read> {
 impl<R: Read> LogReader<R> {
     /// Starts reading at the beginning of `input`.
     pub fn new(input: R) -> Self {
-        let options = LinearReaderOptions::default()
-            .with_skip_start_magic(true)
-            .with_skip_end_magic(true)
-            .with_prevalidate_chunk_crcs(true)
-            .with_validate_summary_section_crc(true)
-            .with_record_length_limit(RECORD_LIMIT_BYTES);
         Self {
             input,
-            parser: LinearReader::new_with_options(options),
+            parser: LinearReader::new_with_options(options().with_validate_summary_section_crc(true)),
             bytes_read: 0,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
@@ -198,8 +192,7 @@ impl<R: Read> LogReader<R> {
                     break;
                 }
                 Some(Err(error)) => {
-                    let damage = self.describe(&error);
-                    self.finish(Some(damage));
+                    self.finish(Some(self.describe(&error)));
                     break;
                 }
                 Some(Ok(LinearReadEvent::ReadRequest(_))) => {
@@ -208,8 +201,7 @@ impl<R: Read> LogReader<R> {
                 }
                 // A hole in a file is read as an endless row of such records.
                 Some(Ok(LinearReadEvent::Record { opcode: 0, .. })) => {
-                    let damage = self.corrupt("a record of type 0, which does not exist");
-                    self.finish(Some(damage));
+                    self.finish(Some(self.corrupt("a record of type 0, which does not exist")));
                     break;
                 }
                 // One between the chunks was passed over already.
@@ -229,10 +221,7 @@ impl<R: Read> LogReader<R> {
                         return Ok(Some(item));
                     }
                 }
-                Err(error) => {
-                    let damage = self.describe(&error);
-                    self.finish(Some(damage));
-                }
+                Err(error) => self.finish(Some(self.describe(&error))),
             }
         }
         Ok(None)
@@ -255,8 +244,7 @@ impl<R: Read> LogReader<R> {
         let [opcode, length @ ..] = head;
         let bytes = u64::from_le_bytes(length);
         if count < HEAD_BYTES {
-            let damage = self.cut();
-            self.finish(Some(damage));
+            self.finish(Some(self.cut()));
             return Ok(());
         }
         let most = if opcode == op::METADATA { METADATA_LIMIT_BYTES } else { RECORD_LIMIT_BYTES };
@@ -286,17 +274,14 @@ impl<R: Read> LogReader<R> {
             self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes: unpacked });
         } else if opcode == op::MESSAGE && self.is_chunked {
             // One flipped bit makes a message of a chunk's index.
-            let damage = self.corrupt("a message beside the chunks, which no checksum protects");
-            self.note(damage);
+            self.note(self.corrupt("a message beside the chunks, which no checksum protects"));
         } else {
             self.parser.notify_read(HEAD_BYTES + count);
         }
         if count < length {
-            let damage = self.cut();
-            self.finish(Some(damage));
+            self.finish(Some(self.cut()));
         } else if let Some(reason) = damage {
-            let damage = self.corrupt(reason);
-            self.note(damage);
+            self.note(self.corrupt(reason));
         }
         Ok(())
     }
@@ -319,8 +304,7 @@ impl<R: Read> LogReader<R> {
             }
         }
         if left > 0 {
-            let damage = self.corrupt("a record that is longer than the rest of the file");
-            self.finish(Some(damage));
+            self.finish(Some(self.corrupt("a record that is longer than the rest of the file")));
         } else if head.first() != Some(&op::ATTACHMENT) {
             self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes });
         }
@@ -394,8 +378,7 @@ impl<R: Read> LogReader<R> {
                 None
             }
             McapRecord::Message { header, .. } if !self.channels.contains_key(&header.channel_id) => {
-                let damage = self.corrupt("a message of a channel that is not in the log");
-                self.note(damage);
+                self.note(self.corrupt("a message of a channel that is not in the log"));
                 None
             }
             McapRecord::Message { header, data } => {
@@ -432,18 +415,18 @@ impl<R: Read> LogReader<R> {
     }
 }
 
+/// Options of a parser that receives the records one by one.
+fn options() -> LinearReaderOptions {
+    LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(RECORD_LIMIT_BYTES)
+}
+
 /// Reads until the buffer is full or the input ends; returns how many bytes there were.
-fn fill(input: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
-    let mut filled = 0;
-    while filled < buffer.len() {
-        match input.read(&mut buffer[filled..]) {
-            Ok(0) => break,
-            Ok(count) => filled += count,
-            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(filled)
+fn fill(input: &mut impl Read, mut buffer: &mut [u8]) -> std::io::Result<usize> {
+    std::io::copy(&mut input.take(buffer.len() as u64), &mut buffer).map(|count| count as usize)
 }
 
 /// Unpacked size stated in the body of a chunk.
@@ -491,12 +474,7 @@ pub fn records_of_chunk(
     if unpacked > RECORD_LIMIT_BYTES as u64 {
         return Err(RecordError::TooLarge(unpacked));
     }
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(RECORD_LIMIT_BYTES);
-    let mut reader = LinearReader::new_with_options(options);
+    let mut reader = LinearReader::new_with_options(options());
     let head: Vec<u8> = std::iter::once(op::CHUNK).chain((body.len() as u64).to_le_bytes()).collect();
     let mut input = head.as_slice().chain(body);
     while let Some(event) = reader.next_event() {
@@ -520,18 +498,10 @@ pub fn records_of_chunk(
 fn attachment_fits(data: &[u8]) -> bool {
     const TIMES_BYTES: usize = 16;
     const DATA_LENGTH_AND_CHECKSUM_BYTES: usize = 12;
-    let behind_string = |rest: &[u8]| -> Option<usize> {
-        let length = rest.first_chunk().map(|bytes| u32::from_le_bytes(*bytes))?;
-        usize::try_from(length).ok()?.checked_add(4)
-    };
-    let Some(rest) = data.get(TIMES_BYTES..) else {
-        return false;
-    };
-    let Some(rest) = behind_string(rest).and_then(|length| rest.get(length..)) else {
-        return false;
-    };
-    let Some(rest) = behind_string(rest).and_then(|length| rest.get(length..)) else {
-        return false;
-    };
-    rest.len() >= DATA_LENGTH_AND_CHECKSUM_BYTES
+    fn behind_string(rest: &[u8]) -> Option<&[u8]> {
+        let length = u32::from_le_bytes(*rest.first_chunk()?);
+        rest.get(usize::try_from(length).ok()?.checked_add(4)?..)
+    }
+    let behind_strings = data.get(TIMES_BYTES..).and_then(behind_string).and_then(behind_string);
+    behind_strings.is_some_and(|rest| rest.len() >= DATA_LENGTH_AND_CHECKSUM_BYTES)
 }

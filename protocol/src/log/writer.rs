@@ -68,34 +68,26 @@ impl<W: Write + Seek> LogWriter<W> {
             .chunk_size(Some(CHUNK_BYTES))
             .library(format!("touchdown {} {}", header.writer, env!("CARGO_PKG_VERSION")))
             .create(output)?;
-        writer.write_metadata(&mcap::records::Metadata {
-            name: METADATA_BUILD.to_owned(),
-            metadata: build_info(),
-        })?;
-        writer.write_metadata(&mcap::records::Metadata {
-            name: METADATA_SCHEMA.to_owned(),
-            metadata: BTreeMap::from([(SCHEMA_VERSION_ENTRY.to_owned(), SCHEMA_VERSION.to_string())]),
-        })?;
-        writer.write_metadata(&mcap::records::Metadata {
-            name: METADATA_RUN.to_owned(),
-            metadata: header.run.clone(),
-        })?;
-        let mut attach = |name: &str, media_type: &str, text: &str| {
+        let schema = BTreeMap::from([(SCHEMA_VERSION_ENTRY.to_owned(), SCHEMA_VERSION.to_string())]);
+        for (name, metadata) in
+            [(METADATA_BUILD, build_info()), (METADATA_SCHEMA, schema), (METADATA_RUN, header.run.clone())]
+        {
+            writer.write_metadata(&mcap::records::Metadata { name: name.to_owned(), metadata })?;
+        }
+        for (name, media_type, text) in [
+            (ATTACHMENT_PROFILE, "application/toml", header.profile_toml.as_deref()),
+            (ATTACHMENT_SCENARIO, "application/toml", header.scenario_toml.as_deref()),
+            (ATTACHMENT_DIALECT, "application/xml", Some(DIALECT_XML)),
+        ] {
+            let Some(text) = text else { continue };
             writer.attach(&mcap::Attachment {
                 log_time: header.start_unix_ns,
                 create_time: header.start_unix_ns,
                 name: name.to_owned(),
                 media_type: media_type.to_owned(),
                 data: text.as_bytes().into(),
-            })
-        };
-        if let Some(profile) = &header.profile_toml {
-            attach(ATTACHMENT_PROFILE, "application/toml", profile)?;
+            })?;
         }
-        if let Some(scenario) = &header.scenario_toml {
-            attach(ATTACHMENT_SCENARIO, "application/toml", scenario)?;
-        }
-        attach(ATTACHMENT_DIALECT, "application/xml", DIALECT_XML)?;
         Ok(Self {
             writer,
             start_unix_ns: header.start_unix_ns,

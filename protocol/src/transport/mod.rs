@@ -9,6 +9,7 @@
 mod stream;
 mod udp;
 
+use std::net::SocketAddr;
 use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -25,6 +26,14 @@ const ACCEPTED_QUEUE_LEN: usize = 256;
 
 /// Bytes to send. With an origin, a link that answers several senders sends them to that one alone.
 type Outgoing = (Vec<u8>, Option<Origin>);
+
+/// The queues between a link and its owner.
+struct Queues {
+    inbox: mpsc::Sender<Received>,
+    outbox: mpsc::Receiver<Outgoing>,
+    /// Senders of which the owner accepted a frame.
+    accepted: mpsc::Receiver<Origin>,
+}
 
 #[derive(Debug)]
 pub struct Transport {
@@ -84,27 +93,13 @@ impl Transport {
         let (inbox, received) = mpsc::channel(if is_udp { udp::INBOX_LEN } else { QUEUE_LEN });
         let (queue, outbox) = mpsc::channel(QUEUE_LEN);
         let (accepted, accepted_by_owner) = mpsc::channel(ACCEPTED_QUEUE_LEN);
+        let queues = Queues { inbox, outbox, accepted: accepted_by_owner };
         match &mut address {
-            LinkAddress::UdpIn(local) => {
-                let queues = udp::Queues { inbox, outbox, accepted: accepted_by_owner };
-                let bound = udp::listen(local, queues).await?;
-                // With port 0 the system chooses a port, and the address then names it.
-                if local.ends_with(":0") {
-                    *local = bound.to_string();
-                }
-            }
-            LinkAddress::UdpOut(remote) => {
-                let queues = udp::Queues { inbox, outbox, accepted: accepted_by_owner };
-                udp::connect(remote, queues).await?;
-            }
-            LinkAddress::TcpIn(local) => {
-                let bound = stream::listen_tcp(local, inbox, outbox, accepted_by_owner).await?;
-                if local.ends_with(":0") {
-                    *local = bound.to_string();
-                }
-            }
-            LinkAddress::TcpOut(remote) => stream::connect_tcp(remote.clone(), inbox, outbox),
-            LinkAddress::Serial { path, baud } => stream::open_serial(path.clone(), *baud, inbox, outbox),
+            LinkAddress::UdpIn(local) => udp::listen(local, queues).await?,
+            LinkAddress::UdpOut(remote) => udp::connect(remote, queues).await?,
+            LinkAddress::TcpIn(local) => stream::listen_tcp(local, queues).await?,
+            LinkAddress::TcpOut(remote) => stream::connect_tcp(remote.clone(), queues),
+            LinkAddress::Serial { path, baud } => stream::open_serial(path.clone(), *baud, queues),
         }
         let sender = TransportSender { queue, accepted, dropped: Arc::new(AtomicU64::new(0)) };
         Ok(Self { address, received, sender })
@@ -136,6 +131,13 @@ impl Transport {
 
     pub fn sender(&self) -> TransportSender {
         self.sender.clone()
+    }
+}
+
+/// Names the port that the system chose in an address with port 0.
+fn name_port(address: &mut String, bound: SocketAddr) {
+    if address.ends_with(":0") {
+        *address = bound.to_string();
     }
 }
 
@@ -192,27 +194,22 @@ impl FromStr for LinkAddress {
         if head.is_empty() {
             return Err(refuse("the address is empty"));
         }
-        match kind {
-            "udpin" | "udpout" | "tcpin" | "tcpout" => {
-                tail.parse::<u16>()
-                    .map_err(|_not_a_port| refuse("the port is not a number from 0 to 65535"))?;
-                let address = rest.to_owned();
-                Ok(match kind {
-                    "udpin" => Self::UdpIn(address),
-                    "udpout" => Self::UdpOut(address),
-                    "tcpin" => Self::TcpIn(address),
-                    _ => Self::TcpOut(address),
-                })
-            }
+        let of_network = match kind {
+            "udpin" => Self::UdpIn,
+            "udpout" => Self::UdpOut,
+            "tcpin" => Self::TcpIn,
+            "tcpout" => Self::TcpOut,
             "serial" => {
                 let baud = tail.parse().map_err(|_not_a_rate| refuse("the baud rate is not a number"))?;
                 if !(1_200..=4_000_000).contains(&baud) {
                     return Err(refuse("the baud rate is not between 1200 and 4000000"));
                 }
-                Ok(Self::Serial { path: head.to_owned(), baud })
+                return Ok(Self::Serial { path: head.to_owned(), baud });
             }
-            _ => Err(refuse("unknown kind of link")),
-        }
+            _ => return Err(refuse("unknown kind of link")),
+        };
+        tail.parse::<u16>().map_err(|_not_a_port| refuse("the port is not a number from 0 to 65535"))?;
+        Ok(of_network(rest.to_owned()))
     }
 }
 
@@ -230,7 +227,6 @@ impl fmt::Display for LinkAddress {
 
 #[cfg(test)]
 mod tests {
-    use std::net::SocketAddr;
 
     use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
     use tokio::net::{TcpStream, UdpSocket};

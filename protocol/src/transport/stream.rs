@@ -1,7 +1,6 @@
 //! Serial lines and TCP connections: carries their bytes, and opens them again when they fail.
 
 use std::io;
-use std::net::SocketAddr;
 use std::time::Duration;
 
 use tokio::io::{AsyncRead, AsyncReadExt as _, AsyncWrite, AsyncWriteExt as _};
@@ -11,7 +10,7 @@ use tokio::sync::{broadcast, oneshot};
 use tokio::time::Instant;
 use tokio_serial::{SerialPortBuilderExt as _, SerialStream};
 
-use super::Outgoing;
+use super::{Outgoing, Queues, name_port};
 use crate::hub::{Origin, Received, StreamId};
 
 const READ_LEN: usize = 4096;
@@ -37,7 +36,8 @@ pub(super) trait Line: Send + 'static {
 }
 
 /// Keeps a stream open and carries bytes over it until the owner drops the link.
-pub(super) async fn run<L: Line>(line: L, inbox: Sender<Received>, mut outbox: Receiver<Outgoing>) {
+async fn run<L: Line>(line: L, queues: Queues) {
+    let Queues { inbox, mut outbox, .. } = queues;
     let mut last_trouble = String::new();
     for opening in 0.. {
         let stream_id: StreamId = if L::BEGINS_ANEW { opening } else { 0 };
@@ -129,8 +129,8 @@ pub(super) async fn read_all(
 
 // Serial lines: opened again when the device comes back.
 
-pub(super) fn open_serial(path: String, baud: u32, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
-    tokio::spawn(run(Port { path, baud }, inbox, outbox));
+pub(super) fn open_serial(path: String, baud: u32, queues: Queues) {
+    tokio::spawn(run(Port { path, baud }, queues));
 }
 
 struct Port {
@@ -174,18 +174,12 @@ const CONNECT_WITHIN: Duration = Duration::from_secs(5);
 /// A pause this long means that no more bytes of a begun frame will follow.
 const SILENCE: Duration = Duration::from_secs(1);
 
-/// Binds and serves. Returns the bound address, which names the port that the system chose if
-/// `address` has port 0.
-pub(super) async fn listen_tcp(
-    address: &str,
-    inbox: Sender<Received>,
-    outbox: Receiver<Outgoing>,
-    accepted: Receiver<Origin>,
-) -> io::Result<SocketAddr> {
-    let listener = TcpListener::bind(address).await?;
-    let bound = listener.local_addr()?;
-    tokio::spawn(serve(listener, inbox, outbox, accepted));
-    Ok(bound)
+/// Binds and serves. Afterwards the address names the port.
+pub(super) async fn listen_tcp(address: &mut String, queues: Queues) -> io::Result<()> {
+    let listener = TcpListener::bind(&*address).await?;
+    name_port(address, listener.local_addr()?);
+    tokio::spawn(serve(listener, queues));
+    Ok(())
 }
 
 /// A client that is being served; dropping it disconnects.
@@ -212,12 +206,8 @@ fn make_room(clients: &mut Vec<Client>, now: Instant) -> bool {
     true
 }
 
-async fn serve(
-    listener: TcpListener,
-    inbox: Sender<Received>,
-    mut outbox: Receiver<Outgoing>,
-    mut accepted: Receiver<Origin>,
-) {
+async fn serve(listener: TcpListener, queues: Queues) {
+    let Queues { inbox, mut outbox, mut accepted } = queues;
     let (all, _) = broadcast::channel::<Outgoing>(CLIENT_QUEUE);
     let mut clients: Vec<Client> = Vec::new();
     let mut stream_id: StreamId = 0;
@@ -296,8 +286,8 @@ async fn serve_client(
     let _ = inbox.send(Received::Gone(stream_id)).await;
 }
 
-pub(super) fn connect_tcp(address: String, inbox: Sender<Received>, outbox: Receiver<Outgoing>) {
-    tokio::spawn(run(Connection { address }, inbox, outbox));
+pub(super) fn connect_tcp(address: String, queues: Queues) {
+    tokio::spawn(run(Connection { address }, queues));
 }
 
 struct Connection {

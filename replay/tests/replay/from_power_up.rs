@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use flight::computer::crew::{CrewCommand, People, Request};
-use flight::computer::messages::Severity;
+use flight::computer::messages::{CrewMessage, Severity};
 use flight::computer::{Commander, LogState};
 use flight::rules::arming::Uplink;
 use flight::rules::operator::{Name, Operator, Role};
@@ -157,8 +157,10 @@ impl Flown {
                 VehicleEvent::Verdict => {
                     record_at(Record::LandingVerdict(Box::new(vehicle.verdict_record().unwrap())));
                 }
-                VehicleEvent::PhaseChanged { to, .. } => self.phases.push(*to),
-                VehicleEvent::Text { severity, text } if *severity >= Severity::Warning => {
+                VehicleEvent::Message(CrewMessage::PhaseChanged { to, .. }) => self.phases.push(*to),
+                VehicleEvent::Message(CrewMessage::Text { severity, text })
+                    if *severity >= Severity::Warning =>
+                {
                     record_at(Record::Event(Event {
                         level: EventLevel::Warning,
                         name: "vehicle".to_owned(),

@@ -269,7 +269,7 @@ impl Rig {
 
     /// The answer names the ask that somebody else has to confirm.
     pub(crate) fn answer_with(&mut self, target: Address, command: MavCmd, result: u8, detail: i32) {
-        let answer = CommandAnswer { command: command as u16, result, progress: 0, detail, target };
+        let answer = CommandAnswer { command: command as u16, result, detail, target };
         let frame: Option<Frame> = answer.encode(&mut self.encoder);
         if let Some(frame) = frame {
             self.msg(Msg::Frame(frame));

@@ -9,7 +9,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 use mavlink::MessageData as _;
-use protocol::command::CommandRequest;
+use protocol::command::{CommandRequest, whole_in};
 use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
 };
@@ -48,7 +48,6 @@ pub struct Unfit {
 /// The command is unknown or its parameters are out of range; the error holds the answer.
 pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
     let [param1, param2, ..] = request.params;
-    let unfit = |result, reason: String| Err(Unfit { result, reason: Some(reason) });
     if request.is(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM) {
         // A force code does not change an arm: every check still applies.
         if param1.to_bits() == 1.0f32.to_bits() {
@@ -58,10 +57,7 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         } else if param1 == 0.0 {
             Ok(Command::Vehicle(CrewCommand::Disarm))
         } else {
-            unfit(
-                MavResult::MAV_RESULT_DENIED,
-                format!("arm refused: param1 = {param1}, must be 1 (arm) or 0 (disarm)"),
-            )
+            denied(format!("arm refused: param1 = {param1}, must be 1 (arm) or 0 (disarm)"))
         }
     } else if request.is(MavCmd::MAV_CMD_MISSION_START) {
         Ok(Command::Vehicle(CrewCommand::Start))
@@ -69,16 +65,14 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         if param1 == 0.0 {
             Ok(Command::Vehicle(CrewCommand::Hold))
         } else {
-            unfit(
-                MavResult::MAV_RESULT_DENIED,
-                "a held countdown cannot be continued: start again".to_owned(),
-            )
+            denied("a held countdown cannot be continued: start again".to_owned())
         }
     } else if request.is(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION) {
         if param1 > 0.5 {
             Ok(Command::Vehicle(CrewCommand::Abort))
         } else {
-            unfit(MavResult::MAV_RESULT_FAILED, format!("termination: param1 = {param1}, must be above 0.5"))
+            let reason = format!("termination: param1 = {param1}, must be above 0.5");
+            Err(Unfit { result: MavResult::MAV_RESULT_FAILED, reason: Some(reason) })
         }
     } else if request.is(MavCmd::MAV_CMD_TD_TAP) {
         Ok(Command::Vehicle(CrewCommand::Tap))
@@ -86,13 +80,11 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         Ok(Command::Vehicle(CrewCommand::TakeCommand))
     } else if request.is(MavCmd::MAV_CMD_TD_PAD_CHECK) {
         let kinds = [CrewCommand::EndCheck, CrewCommand::Check, CrewCommand::CheckStill, CrewCommand::Seen];
-        let kind = (0_u8..).zip(kinds).find(|(number, _)| f32::from(*number).to_bits() == param1.to_bits());
-        match kind {
-            Some((_, kind)) => Ok(Command::Vehicle(kind)),
-            None => unfit(
-                MavResult::MAV_RESULT_DENIED,
-                format!("check: param1 = {param1}, must be 0 (end), 1 (all), 2 (without motion) or 3 (seen)"),
-            ),
+        if let Some(number) = whole_in(param1, 0..=3) {
+            Ok(Command::Vehicle(kinds[number as usize]))
+        } else {
+            let accepted = "0 (end), 1 (all), 2 (without motion) or 3 (seen)";
+            denied(format!("check: param1 = {param1}, must be {accepted}"))
         }
     } else if request.is(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL) {
         Ok(Command::SetInterval { message_id: message_id(param1)?, interval_us: param2 })
@@ -115,10 +107,7 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
 /// The number of the proposal that an arm or a start confirms, in parameter 3. Other ground
 /// stations leave it at 0 or NaN: their command is a proposal.
 pub fn confirmed_proposal(request: &CommandRequest) -> Option<u16> {
-    let param3 = request.params[2];
-    let confirms =
-        (1.0..=f32::from(u16::MAX)).contains(&param3) && libm::truncf(param3).to_bits() == param3.to_bits();
-    confirms.then_some(param3 as u16)
+    whole_in(request.params[2], 1..=u16::MAX.into()).and_then(|number| u16::try_from(number).ok())
 }
 
 /// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl,
@@ -145,11 +134,11 @@ pub fn mav_result(ending: Ending) -> MavResult {
 
 /// A message id sent as a float.
 fn message_id(param: f32) -> Result<u32, Unfit> {
-    let largest = 0x00FF_FFFF_u32 as f32;
-    if (0.0..=largest).contains(&param) && libm::truncf(param).to_bits() == param.to_bits() {
-        return Ok(param as u32);
-    }
-    let reason = format!("message id {param}: must be a whole number from 0 to 16777215");
+    let wrong = || denied(format!("message id {param}: must be a whole number from 0 to 16777215"));
+    whole_in(param, 0..=0x00FF_FFFF).map_or_else(wrong, Ok)
+}
+
+fn denied<T>(reason: String) -> Result<T, Unfit> {
     Err(Unfit { result: MavResult::MAV_RESULT_DENIED, reason: Some(reason) })
 }
 

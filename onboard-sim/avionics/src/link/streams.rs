@@ -60,7 +60,7 @@ pub(crate) const SLOW_UPLINK_HZ: f64 = 1.0;
 const SPARED_VITAL_S: f64 = 1.0;
 const SPARED_S: f64 = 10.0;
 /// Shortest interval of a message that is sent early, s.
-const HURRIED_S: f64 = 0.1;
+pub(crate) const HURRIED_S: f64 = 0.1;
 
 /// Bytes reserved for vital messages: a heartbeat, a flight status and the answer to an abort, all
 /// in one instant. They never wait for telemetry.
@@ -171,9 +171,10 @@ pub const STANDARD: &[Standard] = &[
 ];
 
 #[derive(Debug, Clone, Copy)]
-struct Stream {
-    message_id: u32,
-    frame_len: usize,
+pub(crate) struct Stream {
+    pub(crate) message_id: u32,
+    /// Its longest frame, bytes.
+    pub(crate) frame_len: usize,
     /// `None`: off unless requested.
     default_interval_s: Option<f64>,
     /// `None`: switched off.
@@ -185,49 +186,29 @@ struct Stream {
 }
 
 impl Stream {
+    pub(crate) fn is_vital(&self) -> bool {
+        is_vital(self.message_id)
+    }
+
     fn bytes_s(&self, interval_s: Option<f64>) -> f64 {
         interval_s.map_or(0.0, |interval_s| self.frame_len as f64 / interval_s)
     }
 }
 
-/// A message that is due.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Due {
-    pub(crate) message_id: u32,
-    /// Its longest frame, bytes.
-    pub(crate) frame_len: usize,
-    /// Whether the message is vital.
-    pub(crate) vital: bool,
-}
-
 /// Every stream of a vehicle over one link, in the order of its messages.
 #[derive(Debug, Clone)]
 pub struct Streams {
-    signature_len: usize,
+    pub(crate) signature_len: usize,
     crew: bool,
     capacity_bytes_s: u32,
     each: Vec<Stream>,
 }
 
 impl Streams {
-    /// Every message at its default rate, within a radio's budget.
-    #[expect(clippy::new_without_default, reason = "a link is one of three kinds, and none is the usual one")]
-    pub fn new() -> Self {
-        Self::over_a_radio(0, false)
-    }
-
-    /// The same for signed frames: the fastest messages are slowed down, so that the radio's budget
-    /// holds.
-    pub fn signed() -> Self {
-        Self::over_a_radio(SIGNATURE_LEN, false)
-    }
-
-    /// The same for a vehicle with operators.
-    pub fn with_crew() -> Self {
-        Self::over_a_radio(SIGNATURE_LEN, true)
-    }
-
-    fn over_a_radio(signature_len: usize, crew: bool) -> Self {
+    /// Every message at its default rate, within a radio's budget: the fastest are slowed down
+    /// until it holds. `signature_len`: bytes of each frame's signature; `crew`: the vehicle has
+    /// operators.
+    pub fn over_a_radio(signature_len: usize, crew: bool) -> Self {
         let mut place = 0_usize;
         let streams = STANDARD.iter().map(|standard| {
             // Spread in time, so that the slow messages are not all due at the same instant.
@@ -277,7 +258,7 @@ impl Streams {
         let mut rates = self.rates_hz(f64::INFINITY);
         let mut for_vital = VITAL_SHARE * capacity_bytes_s;
         for (rate_hz, stream) in rates.iter_mut().zip(&self.each) {
-            if is_vital(stream.message_id) {
+            if stream.is_vital() {
                 *rate_hz = rate_hz.min((for_vital / stream.frame_len as f64).max(1.0));
                 for_vital -= *rate_hz * stream.frame_len as f64;
             } else if stream.frame_len as f64 > longest {
@@ -291,7 +272,7 @@ impl Streams {
             }
             for (rate_hz, stream) in rates.iter_mut().zip(&self.each) {
                 let is_place = stream.message_id == GLOBAL_POSITION_INT_DATA::ID;
-                if !is_vital(stream.message_id) && !is_place && *rate_hz > STRETCHED_HZ {
+                if !stream.is_vital() && !is_place && *rate_hz > STRETCHED_HZ {
                     *rate_hz = (*rate_hz / 1.05).max(STRETCHED_HZ);
                 }
             }
@@ -353,18 +334,13 @@ impl Streams {
     }
 
     /// The messages that are due, most important first; fewer if the link is reserved for files.
-    pub(crate) fn due(&self, now_s: f64, spared: bool) -> Vec<Due> {
+    pub(crate) fn due(&self, now_s: f64, spared: bool) -> Vec<Stream> {
         let due = |stream: &&Stream| {
-            let least_s = if is_vital(stream.message_id) { SPARED_VITAL_S } else { SPARED_S };
+            let least_s = if stream.is_vital() { SPARED_VITAL_S } else { SPARED_S };
             let is_spared = spared && now_s - stream.sent_s < least_s - 1e-9;
             stream.interval_s.is_some() && now_s >= stream.due_s && !is_spared
         };
-        let named = |&Stream { message_id, frame_len, .. }: &Stream| Due {
-            message_id,
-            frame_len,
-            vital: is_vital(message_id),
-        };
-        self.each.iter().filter(due).map(named).collect()
+        self.each.iter().filter(due).copied().collect()
     }
 
     /// Notes that a message was sent, or that it had no content.
@@ -377,11 +353,6 @@ impl Streams {
             let next_s = stream.due_s + interval_s;
             stream.due_s = if next_s > now_s { next_s } else { now_s + interval_s };
         }
-    }
-
-    /// Sends a message at the next opportunity, but never more than ten times a second.
-    pub fn hurry(&mut self, message_id: u32) {
-        self.at_least_every(message_id, HURRIED_S);
     }
 
     /// Sends a message at most this long after the last one; on a slow line as often as it takes
@@ -420,26 +391,23 @@ impl Streams {
         now_s: f64,
     ) -> (MavResult, Option<String>) {
         let Some(place) = self.each.iter().position(|stream| stream.message_id == message_id) else {
-            return (
-                MavResult::MAV_RESULT_FAILED,
-                Some(format!("message {message_id} is not sent by this vehicle")),
-            );
+            let reason = format!("message {message_id} is not sent by this vehicle");
+            return (MavResult::MAV_RESULT_FAILED, Some(reason));
         };
+        let denied = |reason| (MavResult::MAV_RESULT_DENIED, Some(reason));
         let before = self.each[place];
         let wanted = match interval_us {
             -1.0 => None,
             0.0 => before.default_interval_s,
             us if us >= 1.0 && f64::from(us) * 1e-6 <= MAX_INTERVAL_S => Some(f64::from(us) * 1e-6),
             _ => {
-                let reason =
-                    format!("interval {interval_us} us: must be -1 (off), 0 (default) or 1 to 60000000");
-                return (MavResult::MAV_RESULT_DENIED, Some(reason));
+                let range = "-1 (off), 0 (default) or 1 to 60000000";
+                return denied(format!("interval {interval_us} us: must be {range}"));
             }
         };
         let slower = |interval_s| before.default_interval_s.is_none_or(|default_s| interval_s > default_s);
         if is_vital(message_id) && wanted.is_none_or(slower) {
-            let reason = format!("message {message_id}: vital messages are not slowed down");
-            return (MavResult::MAV_RESULT_DENIED, Some(reason));
+            return denied(format!("message {message_id}: vital messages are not slowed down"));
         }
         let all_before = self.each.clone();
         self.each[place].interval_s = wanted;
@@ -448,11 +416,10 @@ impl Streams {
         let (total, free) = (self.bytes_s(), self.for_telemetry_bytes_s());
         if before.bytes_s(wanted) > before.bytes_s(before.interval_s) && total > free {
             self.each = all_before;
-            let reason = format!(
+            return denied(format!(
                 "message {message_id}: {total:.0} B/s in all; the link's budget is {}, {free:.0} of it for telemetry",
                 self.capacity_bytes_s
-            );
-            return (MavResult::MAV_RESULT_DENIED, Some(reason));
+            ));
         }
         let stream = &mut self.each[place];
         // A new rate counts from now, also after a long interval.

@@ -9,18 +9,19 @@ use crate::outside::Watch;
 use crate::recipe::Recipe;
 use crate::sortie::Sortie;
 use crate::world::Strain;
-use flight::computer::messages::Severity;
+use flight::computer::messages::{CrewMessage, Severity};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Computer, Input, Output};
 use flight::rules::phase::Phase;
 use flight::rules::verdict::{Landing, LandingVerdict};
-use protocol::log::computer_v1::{ComputerFrame, ComputerStart};
+use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::TruthSample;
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1;
 use protocol::log::writer::LogHeader;
 
-use avionics::log::frame::{estimate_to_log, frame_to_log, start_to_log};
+pub use avionics::log::frame::start_to_log as start;
+use avionics::log::frame::{estimate_to_log, frame_to_log};
 use avionics::log::logged::Logged as _;
 
 /// The header of the log of a simulated flight.
@@ -42,12 +43,6 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
         scenario_toml: Some(recipe.dispersion_toml.clone()),
     }
 }
-
-/// A computer as it is now: at power-up or at its release, before its first frame there.
-pub fn start(computer: &Computer) -> ComputerStart {
-    start_to_log(computer)
-}
-
 /// Keeps the flight computer's last frame as its record.
 #[derive(Debug, Clone, Default)]
 pub struct LastFrame {
@@ -140,7 +135,7 @@ pub fn frame_and_phase(flight: &Sortie, last: &mut LastFrame, phase: Phase) -> V
     records.extend(estimate_and_truth(flight));
     let now = flight.computer().mode().phase;
     if now != phase {
-        records.push(phase_event(phase, now));
+        records.push(message_event(&CrewMessage::PhaseChanged { from: phase, to: now }));
     }
     records
 }
@@ -156,9 +151,14 @@ pub fn text_event(severity: Severity, words: &str) -> Record {
     Record::Event(Event { level, name: "vehicle".to_owned(), message: words.to_owned() })
 }
 
-/// A change of phase.
-pub fn phase_event(from: Phase, to: Phase) -> Record {
-    text_event(Severity::Info, &format!("phase {} to {}", from.name(), to.name()))
+/// A message of the computer.
+pub fn message_event(message: &CrewMessage) -> Record {
+    match message {
+        CrewMessage::Text { severity, text } => text_event(*severity, text),
+        CrewMessage::PhaseChanged { from, to } => {
+            text_event(Severity::Info, &format!("phase {} to {}", from.name(), to.name()))
+        }
+    }
 }
 
 /// The verdict on a finished flight; `None` if the vehicle did not reach the ground.

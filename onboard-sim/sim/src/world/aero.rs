@@ -383,10 +383,10 @@ mod tests {
     /// Eq. 15 to 17: the hand values of the allocation's test of the same name, in the world.
     #[test]
     fn val_hand_moments_of_one_fin() {
-        for fin in 0..4 {
+        for (fin, roll) in ROLL.into_iter().enumerate() {
             let moment_n_m = by_fins(&Truth::default(), alone(fin, 1.0), 0.0, 0.0).moment_n_m;
             let expected = Vector3::new(
-                ROLL[fin] * 0.478_848,
+                roll * 0.478_848,
                 flight::vehicle::fins::PITCH[fin] * 0.289_927_5,
                 flight::vehicle::fins::YAW[fin] * 0.502_169_160_532,
             );

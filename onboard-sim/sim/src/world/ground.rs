@@ -75,15 +75,17 @@ pub struct Strain {
     pub tilt_rad: f64,
 }
 
+flight::numbered_enum! {
 /// How a vehicle comes to rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RestOutcome {
     /// Standing on its legs.
-    Upright,
+    Upright = "upright",
     /// Tilted beyond 45 degrees after contact.
-    TippedOver,
+    TippedOver = "tipped over",
     /// Nozzle, fuselage or nose hit the ground.
-    BodyStrike,
+    BodyStrike = "body strike",
+}
 }
 
 /// Positions of a vehicle's legs and hull relative to its centre of gravity, in body axes.

@@ -201,17 +201,7 @@ impl Motor {
             Fault::LateLight { delay_s } => self.hang_fire_s += delay_s.max(0.0),
             Fault::WeakMotor { scale } => self.burn.impulse_scale *= scale.clamp(0.01, 1.0),
             Fault::EarlyBurnout { after_s } => self.out_after_s = after_s.max(0.0),
-            Fault::AscentNoLight
-            | Fault::AscentSelfLights
-            | Fault::AscentWeak { .. }
-            | Fault::SeparationFails
-            | Fault::ParachuteFails
-            | Fault::GimbalStuck
-            | Fault::GimbalJams { .. }
-            | Fault::Reversed { .. }
-            | Fault::Swapped { .. }
-            | Fault::GimbalSlow { .. }
-            | Fault::FinStuck { .. } => {}
+            _ => {}
         }
     }
 }

@@ -155,7 +155,8 @@ impl Server {
     ) -> Taken {
         let FileRequest { source: client, packet, .. } = request;
         self.sessions.retain(|session| now.saturating_sub(session.used_at) < IDLE);
-        let of_file = matches!(packet.opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE)
+        let reads = matches!(packet.opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE);
+        let of_file = reads
             || (!packet.path().is_empty() && place_of(packet.path(), files).is_some())
             || (packet.opcode == Opcode::LIST_DIRECTORY
                 && matches!(parts(packet.path())[..], [directory] if names_log(directory)));
@@ -163,26 +164,14 @@ impl Server {
             self.answer(link, *client, packet.nak(Refusal::Busy));
             return Taken::NotNow;
         }
-        if matches!(packet.opcode, Opcode::READ_FILE | Opcode::BURST_READ_FILE) {
-            let len = self.session_of(*client, packet.session).map(|session| {
+        if reads {
+            let session = self.sessions.iter_mut().find(|session| session.is(*client, packet.session));
+            let refusal = session.map_or(Some(Refusal::InvalidSession), |session| {
                 (session.link, session.used_at) = (link, now);
-                session.len
+                session.queue(packet)
             });
-            match len {
-                None => self.answer(link, *client, packet.nak(Refusal::InvalidSession)),
-                Some(len) if packet.offset >= len => {
-                    if let Some(session) = self.session_of(*client, packet.session)
-                        && packet.opcode == Opcode::BURST_READ_FILE
-                    {
-                        session.burst = None;
-                    }
-                    self.answer(link, *client, packet.nak(Refusal::EndOfFile));
-                }
-                Some(_) => {
-                    if let Some(session) = self.session_of(*client, packet.session) {
-                        session.queue(packet);
-                    }
-                }
+            if let Some(why) = refusal {
+                self.answer(link, *client, packet.nak(why));
             }
             return Taken::Answered;
         }
@@ -298,10 +287,6 @@ impl Server {
             }
         }
         None
-    }
-
-    fn session_of(&mut self, client: Address, number: u8) -> Option<&mut Session> {
-        self.sessions.iter_mut().find(|session| session.is(client, number))
     }
 
     fn answer(&mut self, link: usize, to: Address, packet: Packet) {
@@ -468,9 +453,14 @@ impl Session {
         self.client == client && self.number == number
     }
 
-    /// Takes a request to read inside the file.
-    fn queue(&mut self, request: &Packet) {
-        if request.opcode == Opcode::BURST_READ_FILE {
+    /// Takes a request to read. Returns why one behind the end of the file is refused.
+    fn queue(&mut self, request: &Packet) -> Option<Refusal> {
+        let is_burst = request.opcode == Opcode::BURST_READ_FILE;
+        if request.offset >= self.len {
+            self.burst.take_if(|_| is_burst);
+            return Some(Refusal::EndOfFile);
+        }
+        if is_burst {
             // A repeated request does not restart a burst, and one for pieces farther ahead
             // prolongs it. So a client need not wait for the end of a burst, nor for its last
             // packet if that is lost.
@@ -492,6 +482,7 @@ impl Session {
         } else if self.reads.len() < MAX_READS && !self.reads.contains(request) {
             self.reads.push_back(request.clone());
         }
+        None
     }
 
     /// The next packet. Single pieces and a burst take turns, so that neither waits for the other.
@@ -531,12 +522,8 @@ impl Session {
         files: &mut dyn Files,
     ) -> Result<usize, Refusal> {
         // Some clients leave the size to the vehicle.
-        let wanted = if size == 0 { DATA_LEN } else { usize::from(size).min(DATA_LEN) };
-        let there = self.len.saturating_sub(offset) as usize;
-        if there == 0 {
-            return Err(Refusal::EndOfFile);
-        }
-        let wanted = wanted.min(there);
+        let most = if size == 0 { DATA_LEN } else { usize::from(size).min(DATA_LEN) };
+        let wanted = most.min(self.len.saturating_sub(offset) as usize);
         match files.read(self.place, offset, &mut piece[..wanted]) {
             Some(read) if read == wanted => Ok(read),
             _ => Err(Refusal::Fail),

@@ -10,11 +10,10 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use tokio::net::{UdpSocket, lookup_host};
-use tokio::sync::mpsc::{Receiver, Sender};
 use tokio::time::Instant;
 
 use self::peers::{Newcomer, Peers};
-use super::Outgoing;
+use super::{Queues, name_port};
 use crate::hub::{Origin, Received};
 
 const MAX_DATAGRAM: usize = 2048;
@@ -26,21 +25,12 @@ const MAX_REPORTS: usize = 8;
 /// The link pauses for this long after an error.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// The queues between a link and its owner.
-pub(super) struct Queues {
-    pub(super) inbox: Sender<Received>,
-    pub(super) outbox: Receiver<Outgoing>,
-    /// Senders of which the owner accepted a frame.
-    pub(super) accepted: Receiver<Origin>,
-}
-
-/// Binds and listens. Returns the bound address, which names the port that the system chose if
-/// `address` has port 0.
-pub(super) async fn listen(address: &str, queues: Queues) -> io::Result<SocketAddr> {
-    let socket = UdpSocket::bind(address).await?;
-    let bound = socket.local_addr()?;
+/// Binds and listens. Afterwards the address names the port.
+pub(super) async fn listen(address: &mut String, queues: Queues) -> io::Result<()> {
+    let socket = UdpSocket::bind(&*address).await?;
+    name_port(address, socket.local_addr()?);
     tokio::spawn(run(socket, Peers::any(), queues));
-    Ok(bound)
+    Ok(())
 }
 
 pub(super) async fn connect(address: &str, queues: Queues) -> io::Result<()> {

@@ -9,17 +9,20 @@ use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use alloc::vec;
 use alloc::vec::Vec;
+use core::time::Duration;
 
 use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
-use protocol::hub::line::{SHARE, slowed};
+use protocol::hub::line::{RadioShare, SHARE};
 use protocol::identity::NETWORK_BUDGET_BYTES_S;
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
 use crate::link::stations::MAX_STATIONS;
-use crate::link::streams::{Due, SLOW_UPLINK_HZ, Streams, WINDOW_S, is_slow, reserved_bytes, share_bytes_s};
+use crate::link::streams::{
+    SLOW_UPLINK_HZ, Stream, Streams, WINDOW_S, is_slow, reserved_bytes, share_bytes_s,
+};
 use crate::link::vehicle::VehicleState;
 use crate::link::{parameters, telemetry};
 
@@ -58,7 +61,6 @@ pub(super) struct Lane {
     pub(super) links: Vec<usize>,
     pub(super) streams: Streams,
     pub(super) encoder: Encoder,
-    signature_len: usize,
     sent: Window,
     /// Telemetry of the last [`BRIEFLY_S`] seconds.
     telemetry_briefly: Window,
@@ -91,12 +93,11 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    pub(super) fn new(links: Vec<usize>, streams: Streams, encoder: Encoder, signature_len: usize) -> Self {
+    pub(super) fn new(streams: Streams, encoder: Encoder) -> Self {
         let mut lane = Self {
-            links,
+            links: vec![0],
             streams,
             encoder,
-            signature_len,
             sent: Window::of(WINDOW_S),
             telemetry_briefly: Window::of(BRIEFLY_S),
             answers_briefly: Window::of(BRIEFLY_S),
@@ -116,27 +117,28 @@ impl Lane {
             uplinks_at_s: 0.0,
         };
         let capacity_bytes_s = lane.streams.capacity_bytes_s();
-        lane.set_capacity(capacity_bytes_s);
+        lane.set_capacity(capacity_bytes_s, 0.0);
         lane
     }
 
-    pub(super) fn set_capacity(&mut self, granted_bytes_s: u32) {
+    pub(super) fn set_capacity(&mut self, granted_bytes_s: u32, now_s: f64) {
         self.granted_bytes_s = granted_bytes_s;
-        self.share_with_the_radio();
+        self.share_with_the_radio(now_s);
     }
 
     /// Takes a radio's report about its buffer.
     pub(super) fn on_radio(&mut self, free_percent: u8, now_s: f64) {
-        self.radio.take_report(free_percent, now_s);
-        self.share_with_the_radio();
+        self.radio.on_report(free_percent, Duration::from_secs_f64(now_s));
+        self.share_with_the_radio(now_s);
     }
 
     /// Uses the share of the budget that the radio reports as free.
-    fn share_with_the_radio(&mut self) {
-        let capacity_bytes_s = (self.radio.share() * f64::from(self.granted_bytes_s)) as u32;
+    fn share_with_the_radio(&mut self, now_s: f64) {
+        let share = self.radio.at(Duration::from_secs_f64(now_s));
+        let capacity_bytes_s = (share * f64::from(self.granted_bytes_s)) as u32;
         self.streams.set_capacity(capacity_bytes_s);
         // The reserve of a slow line is the unused part of its baud rate.
-        let reserve = if is_slow(capacity_bytes_s) { reserved_bytes(self.signature_len) } else { 0 };
+        let reserve = if is_slow(capacity_bytes_s) { reserved_bytes(self.streams.signature_len) } else { 0 };
         self.sent.set_limit(capacity_bytes_s as usize + reserve);
         // Over a slow line frames go one by one, so that there are no bursts.
         let briefly = |bytes| if is_slow(capacity_bytes_s) { usize::MAX } else { bytes };
@@ -197,10 +199,7 @@ impl Lane {
         files: &mut FileService,
     ) -> Vec<Outgoing> {
         let now_s = context.now_s;
-        if self.radio.is_outdated(now_s) {
-            self.radio = RadioShare::default();
-            self.share_with_the_radio();
-        }
+        self.share_with_the_radio(now_s);
         let slow = is_slow(self.streams.capacity_bytes_s());
         let Self { sent, telemetry_briefly, answers_briefly, answered, texts_briefly, .. } = self;
         for window in [sent, telemetry_briefly, answers_briefly, answered, texts_briefly] {
@@ -208,7 +207,7 @@ impl Lane {
         }
         let mut frames = Vec::new();
         let due = self.streams.due(now_s, files.is_busy(&self.links, now_s));
-        for due in due.iter().filter(|due| due.vital) {
+        for due in due.iter().filter(|due| due.is_vital()) {
             if due.frame_len > self.sent.room() {
                 break;
             }
@@ -248,7 +247,7 @@ impl Lane {
         if !falls {
             self.send_texts(now_s, &mut frames);
         }
-        for due in due.iter().filter(|due| !due.vital) {
+        for due in due.iter().filter(|due| !due.is_vital()) {
             // The check uses the longest form of the message, so that no frame is built for
             // nothing. Less important messages do not overtake it.
             if due.frame_len > self.room_for_telemetry() || !self.is_line_free(now_s) {
@@ -298,7 +297,7 @@ impl Lane {
 
     /// Sends pieces of files in all the room that is left, evenly spread.
     fn send_pieces(&mut self, now_s: f64, files: &mut FileService, frames: &mut Vec<Frame>) {
-        let longest = PIECE_FRAME_LEN + self.signature_len;
+        let longest = PIECE_FRAME_LEN + self.streams.signature_len;
         let has_own_room = self.granted_bytes_s >= NETWORK_BUDGET_BYTES_S;
         let bytes_s =
             if has_own_room { NETWORK_FILES_BYTES_S } else { f64::from(self.streams.capacity_bytes_s()) };
@@ -322,7 +321,7 @@ impl Lane {
     /// Room for messages that are not vital. Some of the budget is reserved so that vital messages
     /// never wait.
     fn room(&self) -> usize {
-        self.sent.room().saturating_sub(reserved_bytes(self.signature_len))
+        self.sent.room().saturating_sub(reserved_bytes(self.streams.signature_len))
     }
 
     fn room_for_answers(&self) -> usize {
@@ -333,12 +332,12 @@ impl Lane {
         self.room().min(self.telemetry_briefly.room())
     }
 
-    fn send(&mut self, due: &Due, context: &Context, vehicle: &VehicleState<'_>, frames: &mut Vec<Frame>) {
+    fn send(&mut self, due: &Stream, context: &Context, vehicle: &VehicleState<'_>, frames: &mut Vec<Frame>) {
         if let Some(message) = telemetry::message(due.message_id, vehicle, context.identity) {
             let frame = self.encoder.encode(&message);
             // Vital messages do not count as recent telemetry: a change of phase must not delay a
             // position.
-            if !due.vital {
+            if !due.is_vital() {
                 self.telemetry_briefly.take(self.len_of(&frame), context.now_s);
             }
             self.put(frame, context.now_s, frames);
@@ -372,7 +371,7 @@ impl Lane {
     }
 
     fn len_of(&self, frame: &Frame) -> usize {
-        frame.as_bytes().len() + self.signature_len
+        frame.as_bytes().len() + self.streams.signature_len
     }
 
     /// How long these bytes hold the line, s. Only a line slower than a radio is held.
@@ -399,33 +398,6 @@ impl Lane {
 /// texts a sixth of it. Otherwise a burst could spend the whole budget, and even vital messages
 /// would wait.
 pub(super) const BRIEFLY_S: f64 = 0.2;
-
-/// Validity of a radio's report, s.
-const RADIO_REPORT_HOLDS_S: f64 = 10.0;
-
-flight::with_defaults! {
-    /// Share of the budget that a radio leaves: less while its buffer is full (RADIO_STATUS).
-    #[derive(Debug, Clone, Copy)]
-    pub(super) struct RadioShare {
-        share: f64 = 1.0,
-        reported_s: Option<f64> = None,
-    }
-}
-
-impl RadioShare {
-    pub(super) fn share(self) -> f64 {
-        self.share
-    }
-
-    /// Takes a report: how much of its buffer is free, percent.
-    pub(super) fn take_report(&mut self, free_percent: u8, now_s: f64) {
-        *self = Self { share: slowed(self.share, free_percent), reported_s: Some(now_s) };
-    }
-
-    pub(super) fn is_outdated(self, now_s: f64) -> bool {
-        self.reported_s.is_some_and(|at_s| now_s - at_s > RADIO_REPORT_HOLDS_S)
-    }
-}
 
 /// The bytes sent in a sliding window of time.
 #[derive(Debug, Clone)]

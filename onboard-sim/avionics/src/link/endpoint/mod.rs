@@ -42,7 +42,7 @@ use self::requests::{Answered, Refusals, Waiting, Warnings};
 use crate::link::commands::Command;
 pub use crate::link::stations::Path;
 use crate::link::stations::{Sender, Stations};
-use crate::link::streams::{CheckReporter, FindingReporter, Streams};
+use crate::link::streams::{CheckReporter, FindingReporter, HURRIED_S, Streams};
 use crate::link::vehicle::{Identity, VehicleKind, VehicleState};
 use crate::link::{commands, telemetry};
 
@@ -122,27 +122,27 @@ impl VehicleEndpoint {
     /// An endpoint with the standard messages at their default rates, over one link with a radio's
     /// budget.
     pub fn new(kind: VehicleKind) -> Self {
-        Self::over(kind, Streams::new(), 0)
+        Self::over(kind, Streams::over_a_radio(0, false))
     }
 
     /// The same for signed frames, which are longer.
     pub fn sending_signed(kind: VehicleKind) -> Self {
-        Self::over(kind, Streams::signed(), SIGNATURE_LEN)
+        Self::over(kind, Streams::over_a_radio(SIGNATURE_LEN, false))
     }
 
     /// The same for a vehicle with operators. A frame's signature must have been checked with the
     /// key that its link id names ([`protocol::signing::Signing::with_operators`]): here it only
     /// identifies the operator.
     pub fn sending_to_crew(kind: VehicleKind) -> Self {
-        let endpoint = Self::over(kind, Streams::with_crew(), SIGNATURE_LEN);
+        let endpoint = Self::over(kind, Streams::over_a_radio(SIGNATURE_LEN, true));
         Self { stations: Stations::of_a_crew(), ..endpoint }
     }
 
-    fn over(kind: VehicleKind, streams: Streams, signature_len: usize) -> Self {
+    fn over(kind: VehicleKind, streams: Streams) -> Self {
         Self {
             us: VEHICLE,
             identity: Identity { kind, boot_number: 0, uid: 0 },
-            lanes: vec![Lane::new(vec![0], streams, Encoder::new(VEHICLE), signature_len)],
+            lanes: vec![Lane::new(streams, Encoder::new(VEHICLE))],
             capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
             text_id: 0,
             now_s: 0.0,
@@ -183,7 +183,7 @@ impl VehicleEndpoint {
         let slowest_bytes_s = capacities_bytes_s.iter().copied().min().unwrap_or(RADIO_BUDGET_BYTES_S);
         for lane in &mut self.lanes {
             lane.links = (0..capacities_bytes_s.len()).collect();
-            lane.set_capacity(slowest_bytes_s);
+            lane.set_capacity(slowest_bytes_s, 0.0);
         }
         self
     }
@@ -217,10 +217,9 @@ impl VehicleEndpoint {
         }
         self.stations.accepted(frame, &sender_of(frame, path, vehicle), vehicle.time_s);
         if self.sources.len() < MAX_SOURCES && self.sources.insert(frame.source()) {
-            let streams = &mut self.lane(link).streams;
-            streams.hurry(TD_FLIGHT_STATUS_DATA::ID);
-            streams.hurry(TD_TOUCHDOWN_LIMITS_DATA::ID);
-            streams.hurry(TD_MISSION_DATA::ID);
+            for id in [TD_FLIGHT_STATUS_DATA::ID, TD_TOUCHDOWN_LIMITS_DATA::ID, TD_MISSION_DATA::ID] {
+                self.lane(link).streams.at_least_every(id, HURRIED_S);
+            }
         }
         if let Some(request) = CommandRequest::from_frame(frame) {
             if self.us.accepts(request.target) {
@@ -282,13 +281,11 @@ impl VehicleEndpoint {
     /// a forger could cause an answer that the real ground station takes for its own.
     pub fn on_rejected(&mut self, frame: &Frame, why: Rejection) {
         self.stations.refused(frame.source(), why, self.now_s);
-        let Some(request) = CommandRequest::from_frame(frame).filter(|one| self.us.accepts(one.target))
-        else {
-            return;
-        };
-        let Address { system_id, component_id } = request.source;
-        let words = format!("command {} from {system_id}/{component_id} refused: {why}", request.command);
-        self.send_text(Severity::Warning, &words);
+        if let Some(request) = CommandRequest::from_frame(frame).filter(|one| self.us.accepts(one.target)) {
+            let Address { system_id, component_id } = request.source;
+            let words = format!("command {} from {system_id}/{component_id} refused: {why}", request.command);
+            self.send_text(Severity::Warning, &words);
+        }
     }
 
     /// Sends the verdict on the landing to every station at once.
@@ -337,16 +334,12 @@ impl VehicleEndpoint {
         // A phase of the flight may be over within a tenth of a second, and no command can bring it
         // back.
         if !now.phase.on_pad() && before.is_some_and(|before| before.phase != now.phase) {
-            for lane in &mut self.lanes {
-                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
-            }
+            self.at_least_every(TD_FLIGHT_STATUS_DATA::ID, 0.0);
         }
         // A station without a downlink in the countdown for 1 s reports so, and holds it: even the
         // slowest line carries several of these in that time.
         if mode.countdown_end_s.is_some() {
-            for lane in &mut self.lanes {
-                lane.streams.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_STATUS_S);
-            }
+            self.at_least_every(TD_FLIGHT_STATUS_DATA::ID, COUNTDOWN_STATUS_S);
         }
         if !now.interlocks.armed {
             self.stations.set_commander(None);
@@ -354,9 +347,7 @@ impl VehicleEndpoint {
         if now.interlocks.abort_latched {
             let aborted_at_s = *self.aborted_at_s.get_or_insert(self.now_s);
             if self.now_s - aborted_at_s < ABORTED_BEATS_FOR_S {
-                for lane in &mut self.lanes {
-                    lane.streams.at_least_every(HEARTBEAT_DATA::ID, ABORTED_BEAT_S);
-                }
+                self.at_least_every(HEARTBEAT_DATA::ID, ABORTED_BEAT_S);
             }
         }
     }
@@ -374,8 +365,12 @@ impl VehicleEndpoint {
     }
 
     fn hurry(&mut self, message_id: u32) {
+        self.at_least_every(message_id, HURRIED_S);
+    }
+
+    fn at_least_every(&mut self, message_id: u32, interval_s: f64) {
         for lane in &mut self.lanes {
-            lane.streams.hurry(message_id);
+            lane.streams.at_least_every(message_id, interval_s);
         }
     }
 
@@ -446,13 +441,9 @@ impl VehicleEndpoint {
         request: &CommandRequest,
         (result, proposal): (MavResult, Option<u16>),
     ) {
-        let refused = result != MavResult::MAV_RESULT_ACCEPTED;
-        if !refused
-            || self.refusals.may_answer(
-                request.source,
-                result != MavResult::MAV_RESULT_UNSUPPORTED,
-                self.now_s,
-            )
+        let is_supported = result != MavResult::MAV_RESULT_UNSUPPORTED;
+        if result == MavResult::MAV_RESULT_ACCEPTED
+            || self.refusals.may_answer(request.source, is_supported, self.now_s)
         {
             let answer = CommandAnswer::to(request, result);
             let answer = proposal.map_or(answer, |number| answer.for_confirmation(number));
@@ -479,7 +470,7 @@ impl VehicleEndpoint {
     /// Changes the rates of one link: an interval applies to the requesting link. A link that
     /// shared a lane with others gets a separate lane if anything changes.
     fn with_rates_of<T>(&mut self, link: usize, change: impl FnOnce(&mut Streams) -> T) -> T {
-        let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
+        let capacity_bytes_s = self.capacity_bytes_s(link);
         let lane = self.lane(link);
         if lane.links.len() <= 1 {
             return change(&mut lane.streams);
@@ -489,23 +480,25 @@ impl VehicleEndpoint {
         let before = streams.intervals();
         let done = change(&mut streams);
         if streams.intervals() != before {
-            let mut new_lane = lane.split_off(link);
-            new_lane.streams = streams;
-            new_lane.set_capacity(capacity_bytes_s);
-            self.lanes.push(new_lane);
+            self.separate(link).streams = streams;
         }
         done
     }
 
     /// Gives a link a separate lane, if it shared one.
-    fn separate(&mut self, link: usize) {
-        let capacity_bytes_s = self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S);
+    fn separate(&mut self, link: usize) -> &mut Lane {
+        let (capacity_bytes_s, now_s) = (self.capacity_bytes_s(link), self.now_s);
         let lane = self.lane(link);
         if lane.links.len() > 1 {
             let mut new_lane = lane.split_off(link);
-            new_lane.set_capacity(capacity_bytes_s);
+            new_lane.set_capacity(capacity_bytes_s, now_s);
             self.lanes.push(new_lane);
         }
+        self.lane(link)
+    }
+
+    fn capacity_bytes_s(&self, link: usize) -> u32 {
+        self.capacities_bytes_s.get(link).copied().unwrap_or(RADIO_BUDGET_BYTES_S)
     }
 
     fn send_message(

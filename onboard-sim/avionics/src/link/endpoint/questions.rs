@@ -36,9 +36,9 @@ impl VehicleEndpoint {
             }
             return true;
         }
-        if let Some(question) = ListQuestion::from_frame(frame) {
-            if self.us.accepts(question.target) {
-                self.lane(link).request(vec![question.answer]);
+        if let Some((target, answer)) = answer_about_list(frame) {
+            if self.us.accepts(target) {
+                self.lane(link).request(vec![answer]);
             }
             return true;
         }
@@ -93,53 +93,42 @@ impl VehicleEndpoint {
 // common.xml. Requests are parsed from raw bytes, because an unknown mission type must be answered,
 // too.
 
-/// A question about a list, with its answer.
-pub(super) struct ListQuestion {
-    /// The addressee; 0 means all.
-    pub(super) target: Address,
-    pub(super) answer: MavMessage,
-}
-
-impl ListQuestion {
-    /// The question in a frame; `None` for any other message.
-    pub(super) fn from_frame(frame: &Frame) -> Option<Self> {
-        let (bytes, asker) = (frame.padded_payload(), frame.source());
-        let integer = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
-        let id = |at: usize| bytes[at..at + 16].first_chunk().copied().unwrap_or_default();
-        let mission_ack = |kind_at: usize, result| acknowledged(asker, bytes[kind_at], result);
-        let (target_at, answer) = match frame.message_id() {
-            MISSION_REQUEST_LIST => (0, empty_list(asker, bytes[2])),
-            // An upload of zero items clears the list, which is always clear.
-            MISSION_COUNT if integer(0) == 0 => (2, mission_ack(4, MavMissionResult::MAV_MISSION_ACCEPTED)),
-            MISSION_COUNT => (2, mission_ack(4, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
-            MISSION_CLEAR_ALL => (0, mission_ack(2, MavMissionResult::MAV_MISSION_ACCEPTED)),
-            MISSION_REQUEST | MISSION_REQUEST_INT => {
-                (2, mission_ack(4, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE))
-            }
-            MISSION_WRITE_PARTIAL_LIST => (4, mission_ack(6, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
-            MISSION_ITEM | MISSION_ITEM_INT => {
-                (32, mission_ack(37, MavMissionResult::MAV_MISSION_UNSUPPORTED))
-            }
-            LOG_REQUEST_LIST => (4, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())),
-            LOG_REQUEST_DATA => {
-                let ofs = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-                (10, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] }))
-            }
-            PARAM_EXT_REQUEST_READ => (2, no_parameter(id(4), integer(0).cast_signed(), asker)),
-            PARAM_EXT_REQUEST_LIST => (0, no_parameter([0; 16], -1, asker)),
-            PARAM_EXT_SET => {
-                let failed = PARAM_EXT_ACK_DATA {
-                    param_id: CharArray::new(id(2)),
-                    param_result: ParamAck::PARAM_ACK_FAILED,
-                    ..PARAM_EXT_ACK_DATA::default()
-                };
-                (0, MavMessage::PARAM_EXT_ACK(failed))
-            }
-            _ => return None,
-        };
-        let target = Address { system_id: bytes[target_at], component_id: bytes[target_at + 1] };
-        Some(Self { target, answer })
-    }
+/// Addressee of the question about a list in a frame, and the answer; `None` for any other message.
+fn answer_about_list(frame: &Frame) -> Option<(Address, MavMessage)> {
+    let (bytes, asker) = (frame.padded_payload(), frame.source());
+    let integer = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+    let id = |at: usize| bytes[at..at + 16].first_chunk().copied().unwrap_or_default();
+    let mission_ack = |kind_at: usize, result| acknowledged(asker, bytes[kind_at], result);
+    let (target_at, answer) = match frame.message_id() {
+        MISSION_REQUEST_LIST => (0, empty_list(asker, bytes[2])),
+        // An upload of zero items clears the list, which is always clear.
+        MISSION_COUNT if integer(0) == 0 => (2, mission_ack(4, MavMissionResult::MAV_MISSION_ACCEPTED)),
+        MISSION_COUNT => (2, mission_ack(4, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
+        MISSION_CLEAR_ALL => (0, mission_ack(2, MavMissionResult::MAV_MISSION_ACCEPTED)),
+        MISSION_REQUEST | MISSION_REQUEST_INT => {
+            (2, mission_ack(4, MavMissionResult::MAV_MISSION_INVALID_SEQUENCE))
+        }
+        MISSION_WRITE_PARTIAL_LIST => (4, mission_ack(6, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
+        MISSION_ITEM | MISSION_ITEM_INT => (32, mission_ack(37, MavMissionResult::MAV_MISSION_UNSUPPORTED)),
+        LOG_REQUEST_LIST => (4, MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::default())),
+        LOG_REQUEST_DATA => {
+            let ofs = u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+            (10, MavMessage::LOG_DATA(LOG_DATA_DATA { ofs, id: integer(8), count: 0, data: [0; 90] }))
+        }
+        PARAM_EXT_REQUEST_READ => (2, no_parameter(id(4), integer(0).cast_signed(), asker)),
+        PARAM_EXT_REQUEST_LIST => (0, no_parameter([0; 16], -1, asker)),
+        PARAM_EXT_SET => {
+            let failed = PARAM_EXT_ACK_DATA {
+                param_id: CharArray::new(id(2)),
+                param_result: ParamAck::PARAM_ACK_FAILED,
+                ..PARAM_EXT_ACK_DATA::default()
+            };
+            (0, MavMessage::PARAM_EXT_ACK(failed))
+        }
+        _ => return None,
+    };
+    let target = Address { system_id: bytes[target_at], component_id: bytes[target_at + 1] };
+    Some((target, answer))
 }
 
 /// There are no extended parameters. The standard has no answer for that to a question; this is the

@@ -53,20 +53,15 @@ pub(super) struct Waiting {
 /// A command with a number that was answered.
 #[derive(Debug, Clone)]
 pub(super) struct Answered {
-    command: CommandRequest,
-    by: Option<Operator>,
+    key: CommandKey,
     answer: (MavResult, Option<u16>),
 }
 
-/// Whether both are one command: a repetition has the same number.
-fn is_repeated(
-    (one, by): (&CommandRequest, Option<Operator>),
-    of: (&CommandRequest, Option<Operator>),
-) -> bool {
-    let (other, other_by) = of;
-    one.number().is_some()
-        && (one.source, one.command, one.number(), by)
-            == (other.source, other.command, other.number(), other_by)
+/// Sender, command, number and operator: a repetition has the same.
+type CommandKey = (Address, u16, u32, Option<Operator>);
+
+fn key_of(command: &CommandRequest, by: Option<Operator>) -> Option<CommandKey> {
+    Some((command.source, command.command, command.number()?, by))
 }
 
 impl VehicleEndpoint {
@@ -95,17 +90,11 @@ impl VehicleEndpoint {
         }
         // A command that moves something is executed once, however late a repetition arrives; one
         // that stops is executed every time.
-        if can_move(crew_command) {
-            if self
-                .waiting
-                .iter()
-                .any(|waiting| is_repeated((command, by), (&waiting.command, waiting.request.by)))
-            {
+        if let Some(key) = key_of(command, by).filter(|_| can_move(crew_command)) {
+            if self.waiting.iter().any(|waiting| key_of(&waiting.command, waiting.request.by) == Some(key)) {
                 return;
             }
-            let answered =
-                self.answered.iter().find(|done| is_repeated((command, by), (&done.command, done.by)));
-            if let Some(Answered { answer, .. }) = answered.cloned() {
+            if let Some(answer) = self.answered.iter().find(|done| done.key == key).map(|done| done.answer) {
                 return self.acknowledge(link, command, answer);
             }
         }
@@ -141,9 +130,17 @@ impl VehicleEndpoint {
 
     /// Uplink state for the vehicle's next frame, with the crew's requests.
     pub fn uplink_state(&self, time_s: f64) -> UplinkState {
-        let (uplink, commander) = self.uplink(time_s);
         let requests = self.waiting.iter().map(|waiting| waiting.request).collect();
-        UplinkState { uplink, commander, requests }
+        if self.starts_by_itself {
+            return UplinkState { uplink: Uplink::NotNeeded, commander: None, requests };
+        }
+        let commander = self.stations.commander().map(|(station, by)| Commander {
+            station,
+            age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
+            by,
+            deaf: self.stations.is_deaf(station),
+        });
+        UplinkState { uplink: self.stations.best_uplink(time_s), commander, requests }
     }
 
     /// Takes the vehicle's answers to the requests of the last [uplink state](Self::uplink_state);
@@ -170,9 +167,9 @@ impl VehicleEndpoint {
                 let proposal = vehicle.computer.crew().two_person.waiting(vehicle.time_s);
                 let proposal = proposal.filter(|_| answer.ending == Ending::ToConfirm);
                 let answer = (result, proposal.map(|proposal| proposal.number));
-                if can_move(request.command) && command.number().is_some() {
+                if let Some(key) = key_of(&command, request.by).filter(|_| can_move(request.command)) {
                     self.answered.truncate(MAX_ANSWERED - 1);
-                    self.answered.push_front(Answered { command, by: request.by, answer });
+                    self.answered.push_front(Answered { key, answer });
                 }
                 self.acknowledge(link, &command, answer);
             }
@@ -217,20 +214,6 @@ impl VehicleEndpoint {
             CrewCommand::TakeCommand => self.stations.set_commander(Some(here)),
             _ => {}
         }
-    }
-
-    /// Uplink of the best station and of the station that armed the vehicle.
-    fn uplink(&self, time_s: f64) -> (Uplink, Option<Commander>) {
-        if self.starts_by_itself {
-            return (Uplink::NotNeeded, None);
-        }
-        let commander = self.stations.commander().map(|(station, by)| Commander {
-            station,
-            age_s: self.stations.age_s(station, time_s).unwrap_or(f64::INFINITY),
-            by,
-            deaf: self.stations.is_deaf(station),
-        });
-        (self.stations.best_uplink(time_s), commander)
     }
 }
 

@@ -123,14 +123,21 @@ fn heartbeat(state: &VehicleState<'_>, identity: Identity) -> MavMessage {
 }
 
 fn sys_status(state: &VehicleState<'_>) -> MavMessage {
+    use MavSysStatusSensor as S;
     let (sensors, silent) = motion::sensors(state);
-    let present = MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK
-        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
-        | MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-        | sensors
-        | present(state);
-    let mut healthy = present - silent - failing(state);
-    healthy.set(MavSysStatusSensor::MAV_SYS_STATUS_PREARM_CHECK, state.checks_failed() == 0);
+    let mut present = sensors
+        | S::MAV_SYS_STATUS_PREARM_CHECK
+        | S::MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+        | S::MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+        | S::MAV_SYS_STATUS_LOGGING;
+    present.set(S::MAV_SYS_STATUS_SENSOR_BATTERY, state.battery.is_some());
+    let checks_failed = state.checks_failed();
+    let mut healthy = present - silent;
+    healthy.set(S::MAV_SYS_STATUS_LOGGING, state.input().log.running);
+    if TdCheck::from_bits_truncate(checks_failed).contains(TdCheck::TD_CHECK_BATTERY) {
+        healthy -= S::MAV_SYS_STATUS_SENSOR_BATTERY;
+    }
+    healthy.set(S::MAV_SYS_STATUS_PREARM_CHECK, checks_failed == 0);
     let (voltage_battery, current_battery, battery_remaining) = figures(state);
     MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         onboard_control_sensors_present: present,
@@ -297,23 +304,6 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 }
 
 // Battery and storage.
-
-/// Sensors present in SYS_STATUS.
-fn present(state: &VehicleState<'_>) -> MavSysStatusSensor {
-    let mut present = MavSysStatusSensor::MAV_SYS_STATUS_LOGGING;
-    present.set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, state.battery.is_some());
-    present
-}
-
-/// Failing sensors: a log that does not run, and on the pad a battery below its limit.
-fn failing(state: &VehicleState<'_>) -> MavSysStatusSensor {
-    let mut failing = MavSysStatusSensor::empty();
-    failing.set(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING, !state.input().log.running);
-    let checks = TdCheck::from_bits_truncate(state.checks_failed());
-    failing
-        .set(MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_BATTERY, checks.contains(TdCheck::TD_CHECK_BATTERY));
-    failing
-}
 
 /// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not available.
 fn figures(state: &VehicleState<'_>) -> (u16, i16, i8) {

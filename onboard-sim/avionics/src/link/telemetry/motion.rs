@@ -122,37 +122,27 @@ pub(super) fn home(state: &VehicleState<'_>) -> MavMessage {
 /// GPS_RAW_INT: whether the satellite receiver reports. Its position is the estimated one, because
 /// single fixes are not stored.
 pub(super) fn gps(state: &VehicleState<'_>) -> MavMessage {
-    let motion = state.motion();
-    let [north_m, east_m, down_m] = motion.position_m;
-    let [north_m_s, east_m_s, _] = motion.velocity_m_s;
-    let (lat, lon) = degrees_e7(state, north_m, east_m);
-    let fix_type = if state.computer.sensors().gnss_speaks() {
-        GpsFixType::GPS_FIX_TYPE_3D_FIX
-    } else {
-        GpsFixType::GPS_FIX_TYPE_NO_FIX
-    };
-    let unknown = GPS_RAW_INT_DATA {
+    let mut gps = GPS_RAW_INT_DATA {
         time_usec: (1e6 * state.time_s) as u64,
         eph: u16::MAX,
         epv: u16::MAX,
         vel: u16::MAX,
         cog: u16::MAX,
-        fix_type,
+        fix_type: GpsFixType::GPS_FIX_TYPE_NO_FIX,
         satellites_visible: u8::MAX,
         ..GPS_RAW_INT_DATA::default()
     };
-    MavMessage::GPS_RAW_INT(if fix_type == GpsFixType::GPS_FIX_TYPE_3D_FIX {
-        GPS_RAW_INT_DATA {
-            lat,
-            lon,
-            alt: millimetres(state.mission().site.altitude_m - down_m),
-            vel: libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16,
-            cog: libm::round(100.0 * compass_deg(north_m_s, east_m_s)) as u16 % 36_000,
-            ..unknown
-        }
-    } else {
-        unknown
-    })
+    if state.computer.sensors().gnss_speaks() {
+        let motion = state.motion();
+        let [north_m, east_m, down_m] = motion.position_m;
+        let [north_m_s, east_m_s, _] = motion.velocity_m_s;
+        gps.fix_type = GpsFixType::GPS_FIX_TYPE_3D_FIX;
+        (gps.lat, gps.lon) = degrees_e7(state, north_m, east_m);
+        gps.alt = millimetres(state.mission().site.altitude_m - down_m);
+        gps.vel = libm::round(100.0 * libm::hypot(north_m_s, east_m_s)) as u16;
+        gps.cog = libm::round(100.0 * compass_deg(north_m_s, east_m_s)) as u16 % 36_000;
+    }
+    MavMessage::GPS_RAW_INT(gps)
 }
 
 /// No clock on board has the time of day, so the field is zero, as the standard requires.

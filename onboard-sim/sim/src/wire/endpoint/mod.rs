@@ -3,6 +3,7 @@
 pub use avionics::link::endpoint::{Outgoing, Path, UplinkState, VehicleEndpoint, gives_out_its_log};
 pub use avionics::link::vehicle::VehicleKind;
 use flight::computer::crew::{Answer, Request};
+use flight::computer::messages::CrewMessage;
 
 use crate::wire::vehicle::{Vehicle, VehicleEvent, VehicleStep};
 
@@ -21,19 +22,16 @@ pub fn step(
     let to_itself = answers.split_off((requests.len() - local.len()).min(answers.len()));
     endpoint.on_answers(&answers, &vehicle.state());
     for event in &events {
-        forward(endpoint, event);
+        match event {
+            VehicleEvent::Message(CrewMessage::Text { severity, text }) => {
+                endpoint.send_text(*severity, text);
+            }
+            VehicleEvent::Verdict => endpoint.announce_verdict(),
+            // [`VehicleEndpoint::poll`] sees a new phase, like every other change of the mode.
+            VehicleEvent::Message(CrewMessage::PhaseChanged { .. }) | VehicleEvent::Planned(_) => {}
+        }
     }
     (events, to_itself)
-}
-
-/// Forwards the vehicle's messages to the stations. A new phase is seen by
-/// [`VehicleEndpoint::poll`], like every other change of the vehicle's mode.
-fn forward(endpoint: &mut VehicleEndpoint, event: &VehicleEvent) {
-    match event {
-        VehicleEvent::Text { severity, text } => endpoint.send_text(*severity, text),
-        VehicleEvent::Verdict => endpoint.announce_verdict(),
-        VehicleEvent::PhaseChanged { .. } | VehicleEvent::Planned { .. } => {}
-    }
 }
 
 #[cfg(test)]

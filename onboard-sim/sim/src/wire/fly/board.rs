@@ -233,15 +233,8 @@ impl OnTheWire {
     }
 
     pub(super) fn capacity_bytes_s(self, link: &LinkAddress) -> u32 {
-        match link {
-            LinkAddress::Serial { baud, .. } => {
-                self.serial_bytes_s.min((SHARE * f64::from(*baud) / 10.0) as u32)
-            }
-            LinkAddress::UdpIn(_)
-            | LinkAddress::UdpOut(_)
-            | LinkAddress::TcpIn(_)
-            | LinkAddress::TcpOut(_) => self.network_bytes_s,
-        }
+        let of_line = |bytes_s| self.serial_bytes_s.min((SHARE * f64::from(bytes_s)) as u32);
+        link.capacity_bytes_s().map_or(self.network_bytes_s, of_line)
     }
 }
 

@@ -10,7 +10,7 @@ use flight::rules::operator::{Name, Operator, Role};
 use mavlink::MessageData as _;
 use protocol::command::CommandRequest;
 use protocol::crew_file::{CrewFile, Mode};
-use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA, TdRole};
+use protocol::dialect::{MavMessage, TD_BOOK_HEAD_DATA};
 use protocol::frame::Frame;
 use protocol::hub::LinkEvent;
 use protocol::identity::Address;
@@ -18,7 +18,7 @@ use protocol::key_file::KeyFile;
 use protocol::links::{self, MAX_AT_ONCE, Now};
 use protocol::log::record::Direction;
 use protocol::log::recorder::Recorder;
-use protocol::signing::{Anchor, Rejection};
+use protocol::signing::Anchor;
 use protocol::transport::LinkAddress;
 
 use super::FlyError;
@@ -77,16 +77,6 @@ impl Intake {
     }
 }
 
-/// A frame from a link.
-pub(super) enum Received {
-    /// A frame to act on, and its path.
-    Frame(Path, Frame),
-    /// A frame that was received before on another path.
-    Copy(Path, Frame),
-    /// A frame to ignore: its signature is missing or wrong.
-    Rejected(Frame, Rejection),
-}
-
 impl Links {
     pub(super) async fn open(
         endpoints: &[LinkAddress],
@@ -106,7 +96,8 @@ impl Links {
         Now { time: Duration::from_secs_f64(time_s), stamp: self.stamps.now() }
     }
 
-    pub(super) fn receive(&mut self, time_s: f64) -> Vec<Received> {
+    /// Returns what has arrived, with its paths.
+    pub(super) fn receive(&mut self, time_s: f64) -> Vec<(Path, LinkEvent)> {
         let now = self.now(time_s);
         let Self { open: links, intake, recorder, down, .. } = self;
         let recorder = recorder.as_ref();
@@ -118,18 +109,13 @@ impl Links {
                 let Some(data) = links.try_receive(number) else { break };
                 let path = Path { link: number, origin: data.origin() };
                 for event in links.take(number, data, now) {
-                    match event {
+                    match &event {
                         LinkEvent::Accepted(_) => accepted = true,
-                        LinkEvent::Frame(frame) => {
-                            intake.record(&name, &frame, time_s);
-                            received.push(Received::Frame(path, frame));
-                        }
-                        LinkEvent::Copy(frame) => {
-                            intake.record(&name, &frame, time_s);
-                            received.push(Received::Copy(path, frame));
+                        LinkEvent::Frame(frame) | LinkEvent::Copy(frame) => {
+                            intake.record(&name, frame, time_s);
                         }
                         // Counted but not recorded: a flood of forgeries must not fill the log.
-                        LinkEvent::Rejected(frame, why) => received.push(Received::Rejected(frame, why)),
+                        LinkEvent::Rejected(..) => {}
                         LinkEvent::UnknownSenders(words) => {
                             note(recorder, time_s, &format!("link {name}: {words}"));
                         }
@@ -140,6 +126,7 @@ impl Links {
                             down.push(words);
                         }
                     }
+                    received.push((path, event));
                 }
             }
         }
@@ -245,12 +232,7 @@ impl Stamps {
 pub(super) fn operators_of(crew: &CrewFile) -> Vec<Operator> {
     let operator = |member: &protocol::crew_file::Member| {
         let (number, _) = member.key.as_ref()?;
-        let role = match member.role {
-            TdRole::TD_ROLE_OBSERVER => Role::Observer,
-            TdRole::TD_ROLE_RANGE_SAFETY => Role::RangeSafety,
-            TdRole::TD_ROLE_FLIGHT => Role::Flight,
-            TdRole::TD_ROLE_PAD => Role::Pad,
-        };
+        let role = Role::from_index(member.role as u8)?;
         Some(Operator { number: *number, role, name: Name::new(&member.name) })
     };
     crew.members.iter().filter_map(operator).collect()

@@ -19,6 +19,7 @@ use flight::rules::phase::Phase;
 pub use flight::vehicle::mission::StartPoint;
 pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
+use protocol::hub::LinkEvent;
 use protocol::key_file::KeyFileError;
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LandingVerdict;
@@ -28,7 +29,7 @@ use tokio::sync::watch;
 use self::board::OnBoard;
 pub use self::board::{BoardError, OnTheWire};
 pub(crate) use self::links::Delayed;
-use self::links::{Links, Received, operators_of, people_of};
+use self::links::{Links, operators_of, people_of};
 use self::load::AutoStart;
 pub use self::load::load_flight;
 pub use self::pace::Lateness;
@@ -243,11 +244,12 @@ fn vehicle_of(options: &FlyOptions, was_aborted: bool) -> Result<Vehicle, FlyErr
     Ok(vehicle)
 }
 
-fn receive(endpoint: &mut VehicleEndpoint, received: Received, vehicle: &Vehicle) {
-    match received {
-        Received::Frame(path, frame) => endpoint.on_frame(path, &frame, &vehicle.state()),
-        Received::Copy(path, frame) => endpoint.on_copy(path, &frame, &vehicle.state()),
-        Received::Rejected(frame, why) => endpoint.on_rejected(&frame, why),
+fn receive(endpoint: &mut VehicleEndpoint, path: endpoint::Path, event: &LinkEvent, vehicle: &Vehicle) {
+    match event {
+        LinkEvent::Frame(frame) => endpoint.on_frame(path, frame, &vehicle.state()),
+        LinkEvent::Copy(frame) => endpoint.on_copy(path, frame, &vehicle.state()),
+        LinkEvent::Rejected(frame, why) => endpoint.on_rejected(frame, *why),
+        _ => {}
     }
 }
 
@@ -328,14 +330,14 @@ pub async fn fly_observed(
         }
         let warnings = [move_pin(options.pin_out.as_mut(), &mut vehicle), saved_abort.save(&vehicle)];
         for text in warnings.into_iter().flatten() {
-            observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
+            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, text));
         }
         let arrived = links.receive(vehicle.time_s());
         for text in links.down.drain(..) {
-            observe(vehicle.time_s(), &VehicleEvent::Text { severity: Severity::Warning, text });
+            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, text));
         }
-        for received in uplink_radio.pass(arrived, vehicle.time_s(), vehicle.radio()) {
-            receive(&mut endpoint, received, &vehicle);
+        for (path, event) in uplink_radio.pass(arrived, vehicle.time_s(), vehicle.radio()) {
+            receive(&mut endpoint, path, &event, &vehicle);
         }
         let requests = starter.requests(&vehicle);
         let (events, answers) = match &mut on_board {
@@ -349,8 +351,8 @@ pub async fn fly_observed(
         }
         for event in &events {
             observe(time_s, event);
-            if let VehicleEvent::Planned { took_s, deadline_s, .. } = event {
-                solve_times.add(*took_s, *deadline_s);
+            if let VehicleEvent::Planned(timing) = event {
+                solve_times.add(timing.solve_time_s, timing.deadline_s);
             }
         }
         if let Some(recorder) = &options.recorder {

@@ -5,16 +5,15 @@ use std::os::unix::fs::FileExt as _;
 use std::path::Path;
 
 use flight::computer::LogState;
-use flight::computer::messages::Severity;
+use flight::computer::messages::{CrewMessage, Severity};
 use protocol::frame::Frame;
 use protocol::ftp::server::{FileEntry, Files};
-use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::ending;
 
 use crate::wire::endpoint::{VehicleEndpoint, gives_out_its_log};
-use crate::wire::record::{phase_event, text_event};
+use crate::wire::record::{message_event, text_event};
 use crate::wire::vehicle::{Vehicle, VehicleEvent};
 
 pub(super) fn nanoseconds(time_s: f64) -> u64 {
@@ -53,17 +52,11 @@ pub(super) fn record(recorder: &Recorder, vehicle: &Vehicle, events: &[VehicleEv
                 Some(verdict) => Record::LandingVerdict(Box::new(verdict)),
                 None => continue,
             },
-            VehicleEvent::Planned { frame, time_s, took_s, deadline_s } => Record::PilotTiming(PilotTiming {
-                frame: *frame,
-                time_s: *time_s,
-                solve_time_s: *took_s,
-                deadline_s: *deadline_s,
-            }),
-            VehicleEvent::Text { severity, text } => text_event(*severity, text),
-            VehicleEvent::PhaseChanged { from, to } => phase_event(*from, *to),
+            VehicleEvent::Planned(timing) => Record::PilotTiming(*timing),
+            VehicleEvent::Message(message) => message_event(message),
         };
         recorder.record(record, time_ns);
-        if matches!(event, VehicleEvent::PhaseChanged { .. }) {
+        if matches!(event, VehicleEvent::Message(CrewMessage::PhaseChanged { .. })) {
             recorder.sync_soon();
         }
     }

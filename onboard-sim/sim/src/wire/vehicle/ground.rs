@@ -38,7 +38,8 @@ impl GroundWatch {
         let world = sortie.world();
         if let Some(touchdown) = world.touchdown().filter(|_| self.contacts == 0) {
             self.contacts = 1;
-            events.push(contact(touchdown.over_ground.vertical_m_s));
+            let text = format!("ground contact at {:.2} m/s", touchdown.over_ground.vertical_m_s);
+            events.push(VehicleEvent::text(Severity::Notice, text));
         }
         if sortie.goes_on() {
             return events;
@@ -50,7 +51,7 @@ impl GroundWatch {
             self.judged = Some(Judged { time_s, touchdown, landing });
             events.push(VehicleEvent::Verdict);
             let text = in_words(&outcome, sortie.computer().mode().interlocks.abort_latched);
-            events.push(VehicleEvent::Text { severity: Severity::Notice, text });
+            events.push(VehicleEvent::text(Severity::Notice, text));
         }
         let waited_s = world.rest().map_or(f64::INFINITY, |rest| world.time_s() - rest.time_s);
         let phase = sortie.computer().mode().phase;
@@ -58,15 +59,10 @@ impl GroundWatch {
         if unnoticed && waited_s > UNNOTICED_S && !self.given_up {
             self.given_up = true;
             let text = format!("the simulation ends here, in {}", phase.name());
-            events.push(VehicleEvent::Text { severity: Severity::Error, text });
+            events.push(VehicleEvent::text(Severity::Error, text));
         }
         events
     }
-}
-
-fn contact(vertical_m_s: f64) -> VehicleEvent {
-    let text = format!("ground contact at {vertical_m_s:.2} m/s");
-    VehicleEvent::Text { severity: Severity::Notice, text }
 }
 
 /// The outcome of the flight, and the loads of crushable legs, as text.

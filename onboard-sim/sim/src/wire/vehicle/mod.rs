@@ -23,6 +23,7 @@ use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
 use flight::vehicle::mission::StartPoint;
 use protocol::log::computer_v1::ComputerFrame;
+use protocol::log::flight_v1::PilotTiming;
 use protocol::log::record::Record;
 use protocol::log::v1;
 
@@ -132,7 +133,7 @@ impl Vehicle {
         let mut events = Vec::new();
         let (mut released, mut answers) = (false, Vec::new());
         if let Some(output) = output {
-            events.extend(output.messages.into_iter().map(VehicleEvent::from));
+            events.extend(output.messages.into_iter().map(VehicleEvent::Message));
             if output.planned {
                 events.extend(self.planned());
             }
@@ -148,8 +149,8 @@ impl Vehicle {
     /// The event for a frame in which the pilot took over a plan.
     fn planned(&self) -> Option<VehicleEvent> {
         let SensedInput { frame, time_s, .. } = self.computer().flown()?;
-        let took_s = self.computer().pilot().report().took_s;
-        Some(VehicleEvent::Planned { frame, time_s, took_s, deadline_s: PLAN_WITHIN_S })
+        let solve_time_s = self.computer().pilot().report().took_s;
+        Some(VehicleEvent::Planned(PilotTiming { frame, time_s, solve_time_s, deadline_s: PLAN_WITHIN_S }))
     }
 
     /// Events available only in the simulation: the start of the flight, ground contact, the
@@ -163,7 +164,7 @@ impl Vehicle {
         }
         let height_m = self.sortie.world().height_m();
         let text = format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
-        vec![VehicleEvent::Text { severity: Severity::Notice, text }]
+        vec![VehicleEvent::text(Severity::Notice, text)]
     }
 
     /// Its flight computer.
@@ -238,36 +239,16 @@ impl Vehicle {
 /// An event that a vehicle reports.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VehicleEvent {
-    /// A message to the crew.
-    Text {
-        severity: Severity,
-        text: String,
-    },
-    PhaseChanged {
-        from: Phase,
-        to: Phase,
-    },
+    Message(CrewMessage),
     /// The pilot took over a plan in this frame.
-    Planned {
-        /// The frame's number, from the release.
-        frame: u64,
-        /// Its time since the release, s.
-        time_s: f64,
-        /// From the frame of the request, s.
-        took_s: f64,
-        /// Allowed, s.
-        deadline_s: f64,
-    },
+    Planned(PilotTiming),
     /// The vehicle touched down and its landing was judged.
     Verdict,
 }
 
-impl From<CrewMessage> for VehicleEvent {
-    fn from(message: CrewMessage) -> Self {
-        match message {
-            CrewMessage::Text { severity, text } => Self::Text { severity, text },
-            CrewMessage::PhaseChanged { from, to } => Self::PhaseChanged { from, to },
-        }
+impl VehicleEvent {
+    pub(crate) fn text(severity: Severity, text: String) -> Self {
+        Self::Message(CrewMessage::Text { severity, text })
     }
 }
 

@@ -220,8 +220,11 @@ impl World {
 
     /// Injects a fault.
     pub fn inject(&mut self, fault: &Fault) {
-        self.motor.break_down(fault);
         match *fault {
+            Fault::NoLight
+            | Fault::LateLight { .. }
+            | Fault::WeakMotor { .. }
+            | Fault::EarlyBurnout { .. } => self.motor.break_down(fault),
             Fault::GimbalStuck => self.gimbal.iter_mut().for_each(Servo::stick),
             Fault::GimbalJams { deg } => self.gimbal[0].jam(deg.to_radians()),
             Fault::GimbalSlow { scale } => self.gimbal.iter_mut().for_each(|servo| servo.slow(scale)),
@@ -241,10 +244,6 @@ impl World {
                 }
             }
             Fault::ParachuteFails => self.parachute.break_down(),
-            Fault::NoLight
-            | Fault::LateLight { .. }
-            | Fault::WeakMotor { .. }
-            | Fault::EarlyBurnout { .. } => {}
         }
     }
 

@@ -170,9 +170,9 @@ fn a_program_without_a_session_arms_only_the_boot_that_it_names() {
     let ours = || Program::new(255, 7, 1, None);
     let theirs = || Program::new(254, 0, 2, None);
     let real = VehicleEndpoint::new(VehicleKind::Real);
-    for mut range in
-        [Range::without_operators(vec![theirs(), ours()]), Range::of(rocket(), real, vec![theirs()])]
-    {
+    let without_operators = Range::without_operators(vec![theirs(), ours()]);
+    let of_real = Range::of(rocket(), real, vec![theirs()]);
+    for mut range in std::iter::once(without_operators).chain(std::iter::once(of_real)) {
         for (command, param1) in MOVING {
             let unnamed = range.programs[0].request(command, param1, 0, 0.0);
             assert_eq!(range.request_answer(0, &unnamed), DENIED, "{command}");

@@ -319,9 +319,9 @@ fn over_a_radio_a_standard_station_gets_its_requests_and_fast_messages_slow_down
 
 #[test]
 fn the_rates_of_every_kind_of_link_fit_it() {
-    for kind in [Streams::new, Streams::signed, Streams::with_crew] {
+    for (signature_len, crew) in [(0, false), (SIGNATURE_LEN, false), (SIGNATURE_LEN, true)] {
         for capacity_bytes_s in [384, 768, 1_536, RADIO_BUDGET_BYTES_S, 4_608, NETWORK_BUDGET_BYTES_S] {
-            let mut streams = kind();
+            let mut streams = Streams::over_a_radio(signature_len, crew);
             streams.set_capacity(capacity_bytes_s);
             let words = format!("{:.0} of {capacity_bytes_s} B/s", streams.bytes_s());
             assert!(streams.fit(), "{words}");

@@ -189,7 +189,7 @@ impl Wire {
 }
 
 fn texts(frames: &[Frame]) -> Vec<String> {
-    let mut reassembler = Reassembler::new();
+    let mut reassembler = Reassembler::default();
     let chunks = frames.iter().filter_map(|frame| match frame.decode() {
         Ok(MavMessage::STATUSTEXT(chunk)) => Some(reassembler.push(frame.source(), &chunk, Duration::ZERO)),
         _ => None,
@@ -203,7 +203,7 @@ fn count(frames: &[Frame], message_id: u32) -> usize {
 
 #[test]
 fn the_standard_rates_fit_the_radio_and_are_met() {
-    let streams = Streams::new();
+    let streams = Streams::over_a_radio(0, false);
     assert!(streams.fit(), "{} B/s", streams.bytes_s());
     let mut wire = Wire::new();
     let sent = wire.run(10.0);

@@ -1,6 +1,7 @@
 //! Tests the uplink: arming waits for it, a countdown is held without it, and any station holds.
 
 use flight::computer::FRAME_S;
+use flight::computer::messages::CrewMessage;
 use flight::rules::arming::UPLINK_CHECK;
 use flight::rules::phase::{HOLD_LIMIT_S, UPLINK_PROVEN_S, UPLINK_SILENT_S};
 use protocol::dialect::{COMMAND_CANCEL_DATA, MavState, MavType, TdHold, TdMotor};
@@ -131,8 +132,7 @@ impl Pad {
     }
 
     fn message_count(&self, words: &str) -> usize {
-        let says =
-            |event: &&VehicleEvent| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words));
+        let says = |event: &&VehicleEvent| matches!(event, VehicleEvent::Message(CrewMessage::Text { text, .. }) if text.contains(words));
         self.events.iter().filter(says).count()
     }
 }

@@ -64,7 +64,7 @@ const FAILURES: &[Failure] = &[
 
 fn text_of(event: &VehicleEvent) -> Option<&str> {
     match event {
-        VehicleEvent::Text { text, .. } => Some(text),
+        VehicleEvent::Message(CrewMessage::Text { text, .. }) => Some(text),
         _ => None,
     }
 }
@@ -118,7 +118,7 @@ fn whatever_fails_while_it_is_armed_is_an_alarm_and_no_start_is_accepted() {
         (failure.happens)(&mut rocket);
         let events = seconds(&mut rocket, failure.seen_s + 1.0);
         let alarmed = events.iter().any(|event| {
-            matches!(event, VehicleEvent::Text { severity: Severity::Critical, text }
+            matches!(event, VehicleEvent::Message(CrewMessage::Text { severity: Severity::Critical, text })
                 if text.starts_with("armed, and") && text.contains(failure.words))
         });
         assert!(alarmed, "{}: {events:?}", failure.words);

@@ -103,12 +103,12 @@ use flight::computer::crew::Ending;
 
 fn phases(events: &[VehicleEvent]) -> Vec<Phase> {
     let to = |event: &VehicleEvent| match event {
-        VehicleEvent::PhaseChanged { to, .. } => Some(*to),
+        VehicleEvent::Message(CrewMessage::PhaseChanged { to, .. }) => Some(*to),
         _ => None,
     };
     events.iter().filter_map(to).collect()
 }
 
 fn has_text(events: &[VehicleEvent], words: &str) -> bool {
-    events.iter().any(|event| matches!(event, VehicleEvent::Text { text, .. } if text.contains(words)))
+    events.iter().any(|event| matches!(event, VehicleEvent::Message(CrewMessage::Text { text, .. }) if text.contains(words)))
 }

@@ -138,7 +138,7 @@ fn a_mission_that_does_not_land_is_refused_on_the_pad_in_words() {
         events.extend(rocket.advance());
     }
     let complaints = events.iter().filter(|event| {
-        matches!(event, VehicleEvent::Text { severity: Severity::Warning, text } if text.starts_with("not ready: controller warm"))
+        matches!(event, VehicleEvent::Message(CrewMessage::Text { severity: Severity::Warning, text }) if text.starts_with("not ready: controller warm"))
     });
     assert_eq!(complaints.count(), 1, "said unasked, and once: {events:?}");
     assert_eq!(rocket.request(CrewCommand::Arm).ending, Ending::NotNow);
@@ -231,7 +231,8 @@ fn plans_are_late_by_what_they_cost_on_a_board() {
     let (mut took, mut posed) = (Vec::new(), Vec::new());
     while rocket.phase() == Phase::Powered {
         for event in rocket.advance() {
-            if let VehicleEvent::Planned { frame, took_s, deadline_s, .. } = event {
+            if let VehicleEvent::Planned(PilotTiming { frame, solve_time_s: took_s, deadline_s, .. }) = event
+            {
                 let frames = (took_s / FRAME_S).round() as u64;
                 assert_eq!(rocket.state().solve_time_s().to_bits(), took_s.to_bits());
                 assert_eq!(deadline_s.to_bits(), PLAN_WITHIN_S.to_bits());
