@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use flight::control::fins::{Allocation, OpeningRange};
+use flight::control::fins::Allocation;
 use flight::guidance::descent::{LEAST_AIRSPEED_M_S, SHORT_FALL_M_S};
 use flight::guidance::ignition::IgnitionSettings;
 use flight::guidance::vertical::{Column, EvenLanding};
@@ -438,13 +438,12 @@ impl<'a> Vehicle<'a> {
                 .or(|| "let go higher, or hinges at the centre of gravity".to_owned());
         }
         let (min_rad, max_rad) = (fins.control_min_rad(), fins.open_rad());
-        let range = OpeningRange { min_rad, max_rad };
-        let allocation = Allocation { model: airframe.fin_model(), arm_m, range };
+        let allocation = Allocation { model: airframe.fin_model(), arm_m, min_rad, max_rad };
         let pressure_pa = self.pressure_pa(self.terminal_m_s);
         let opened = |pattern: [f64; 4]| pattern.map(|sign| if sign > 0.0 { max_rad } else { min_rad });
         let most_n_m = f64::min(
-            allocation.moments(pressure_pa, opened(PITCH)).pitch_n_m.abs(),
-            allocation.moments(pressure_pa, opened(YAW)).yaw_n_m.abs(),
+            allocation.moments_n_m(pressure_pa, opened(PITCH)).y.abs(),
+            allocation.moments_n_m(pressure_pa, opened(YAW)).z.abs(),
         );
         let lean_deg = descent.lean_max_deg;
         let fins_m2 = airframe.fin_drag_area_m2(&opened(PITCH));

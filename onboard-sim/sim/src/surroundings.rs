@@ -117,7 +117,7 @@ impl Surroundings {
             igniter_continuity: self.sensors.igniter_continuity(),
             booster_attached: self.world.booster_attached(),
             battery_v: Some(self.battery.volts()),
-            ..SensedInput::NONE
+            ..SensedInput::default()
         }
     }
 

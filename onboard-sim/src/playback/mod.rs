@@ -134,7 +134,7 @@ impl Player<'_> {
             pin_out: true,
             log: LogState { running: true, space_bytes: u64::MAX },
             uplink: Uplink::NotNeeded,
-            ..SensedInput::NONE
+            ..SensedInput::default()
         };
         let plan_ready = self.plan_ready_at.take_if(|at| frame >= *at).is_some();
         let input = Input { sensed, requests: &[], rehearsed: None, plan_ready };

@@ -576,7 +576,7 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
         let now = bench.borrow().frame;
         assert!(now < 40_000, "{:?}", frames.computer().mode());
         bench.borrow_mut().pin_out = now > CREW_COMES / 2;
-        let checks = frames.computer().pad_check().state() == CheckState::Running;
+        let checks = frames.computer().pad_check().state == CheckState::Running;
         if now >= next && !checks {
             next = now + CREW_WAITS;
             bench.borrow_mut().requests.extend(crew.next().map(Request::of_the_programme));

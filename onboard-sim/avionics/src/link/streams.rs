@@ -505,8 +505,8 @@ impl CheckReporter {
     pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, boot: u32, now_s: f64) -> Option<MavMessage> {
         let check = vehicle.computer.pad_check();
         let mode = vehicle.mode();
-        let now = (check.run(), check.state());
-        if check.state() == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
+        let now = (check.run, check.state);
+        if check.state == CheckState::NotRun || !mode.phase.on_pad() || mode.interlocks.armed {
             return None;
         }
         if self.last_state != Some(now) {
@@ -516,7 +516,7 @@ impl CheckReporter {
         if now_s < self.due_s {
             return None;
         }
-        let place = self.turn.next(check.findings().len());
+        let place = self.turn.next(check.findings.len());
         let often = check.is_running() || self.turn.rounds < 2;
         self.due_s = now_s + if often { OFTEN_S } else { SELDOM_S };
         Some(telemetry::pad_check(check, place, vehicle.time_s, boot))

@@ -186,7 +186,7 @@ impl Computer {
     /// Decides a request.
     pub(super) fn answer(&mut self, request: &Request) -> Answer {
         let mode = *self.table.mode();
-        let time_s = self.table.time_s();
+        let time_s = self.table.time_s;
         let Request { command, uplink, station, by, .. } = *request;
         if let Some(reason) = self.why_not_of(request) {
             return self.deny(command, reason);
@@ -298,7 +298,7 @@ impl Computer {
             let reason = "two people with a key each, at a station, must agree".into();
             return Err(self.deny(command, reason));
         };
-        let time_s = self.table.time_s();
+        let time_s = self.table.time_s;
         let waited = self.crew.two_person.waiting(time_s);
         match self.crew.two_person.request(act, confirms, (by, station), first, time_s) {
             Reply::Agreed { proposal, confirmed_by } => Ok(Some((proposal, confirmed_by))),
@@ -315,12 +315,12 @@ impl Computer {
 
     /// Records the effect of an accepted request on the crew state.
     fn note_done(&mut self, command: CrewCommand, by: Option<Operator>, agreed: Option<Agreed>) {
-        let time_s = self.table.time_s();
+        let time_s = self.table.time_s;
         let commander = self.input.commander.and_then(|commander| commander.by);
         let commands = |by: Operator| commander.is_some_and(|commander| commander.number == by.number);
         let two_person = &mut self.crew.two_person;
         match (command, agreed) {
-            (CrewCommand::Arm, Some((proposal, _))) => two_person.armed(proposal),
+            (CrewCommand::Arm, Some((proposal, _))) => two_person.armed = Some(proposal),
             // The commanding station is already supervised by its heartbeats: the other operator
             // gives the dead-man confirmations.
             (CrewCommand::Start, Some((proposal, confirmed_by))) if commands(confirmed_by) => {
@@ -350,11 +350,11 @@ impl Computer {
     }
 
     fn tap(&mut self, by: Option<Operator>) -> Answer {
-        let time_s = self.table.time_s();
+        let time_s = self.table.time_s;
         if by.is_some_and(|by| self.crew.two_person.tap(by, time_s)) {
             return Answer::ACCEPTED;
         }
-        let reason = match self.crew.two_person.tapping() {
+        let reason = match self.crew.two_person.tapping {
             Some(tapping) => format!("{} taps", tapping.by),
             None => "no countdown that two people have started".into(),
         };
@@ -380,7 +380,7 @@ impl Computer {
             return self.deny(CrewCommand::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
         }
         // One person cannot both command and give the dead-man confirmations.
-        if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping(), request.by)
+        if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping, request.by)
             && tapping.by.number == by.number
         {
             return self.deny(CrewCommand::TakeCommand, format!("{by} taps: hold the countdown first"));
@@ -430,7 +430,7 @@ impl Computer {
     /// it.
     pub(super) fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
         let start = self.start_point();
-        if !self.table.mode().may_hold_for(cause, start, self.table.time_s()) {
+        if !self.table.mode().may_hold_for(cause, start, self.table.time_s) {
             return false;
         }
         self.table.report(Severity::Critical, why());
@@ -445,7 +445,7 @@ impl Computer {
             self.crew.two_person.end_taps();
             return;
         }
-        let Some(by) = self.crew.two_person.lapsed(self.table.time_s()) else { return };
+        let Some(by) = self.crew.two_person.lapsed(self.table.time_s) else { return };
         if self.hold(HoldCause::TapOverdue, || format!("no tap of {by} for {TAP_WITHIN_S} s")) {
             self.crew.held_by = Some(by);
             self.crew.two_person.end_taps();
@@ -463,15 +463,7 @@ fn act_of(command: CrewCommand) -> Option<Act> {
     match command {
         CrewCommand::Arm => Some(Act::Arm),
         CrewCommand::Start => Some(Act::Start),
-        CrewCommand::Disarm
-        | CrewCommand::Hold
-        | CrewCommand::Abort
-        | CrewCommand::Tap
-        | CrewCommand::TakeCommand
-        | CrewCommand::Check
-        | CrewCommand::CheckStill
-        | CrewCommand::EndCheck
-        | CrewCommand::Seen => None,
+        _ => None,
     }
 }
 

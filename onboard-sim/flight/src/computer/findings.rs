@@ -5,8 +5,10 @@
 //! vehicle sends the findings, and a report begins with them. Simulated truth is not used, because
 //! a real flight has none.
 //!
-//! Each [`Sign`] has one rule, in [`Watcher::seen`] and [`RULES`].
+//! Each [`Sign`] has one rule, in [`Watcher::seen`].
 
+use alloc::borrow::{Cow, ToOwned as _};
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::format;
 use alloc::string::{String, ToString as _};
 use alloc::vec::Vec;
@@ -72,49 +74,6 @@ pub enum Sign {
     Latched,
 }
 
-/// Every sign, and the time for which it must last to become a finding, s. Shorter signs are noise,
-/// a dropped sample or a gust.
-const RULES: [(Sign, f64); 38] = [
-    (Sign::Restart, 0.0),
-    (Sign::Gnss, 0.0),
-    (Sign::Barometer, 0.0),
-    (Sign::Lidar, 0.0),
-    (Sign::Implausible(ACCELEROMETER), 0.0),
-    (Sign::Implausible(GYRO), 0.0),
-    (Sign::Repeats(ACCELEROMETER), 0.0),
-    (Sign::Repeats(GYRO), 0.0),
-    (Sign::Repeats(BAROMETER), 0.0),
-    (Sign::Repeats(GNSS), 0.0),
-    (Sign::Repeats(LIDAR), 0.0),
-    (Sign::Jumps(ACCELEROMETER), 0.0),
-    (Sign::Jumps(GYRO), 0.0),
-    (Sign::Jumps(BAROMETER), 0.0),
-    (Sign::Jumps(GNSS), 0.0),
-    (Sign::Jumps(LIDAR), 0.0),
-    (Sign::Apart, 0.0),
-    (Sign::HeightsDisagree, 0.5),
-    (Sign::RangesDisagree, 0.2),
-    (Sign::Estimate, 0.2),
-    (Sign::Surface(0), 0.1),
-    (Sign::Surface(1), 0.1),
-    (Sign::Surface(2), 0.3),
-    (Sign::Surface(3), 0.3),
-    (Sign::Surface(4), 0.3),
-    (Sign::Surface(5), 0.3),
-    (Sign::SlowGimbal, 0.0),
-    (Sign::Battery, 0.1),
-    (Sign::AscentMotor, 0.0),
-    (Sign::Separation, 0.5),
-    (Sign::Parachute, 0.0),
-    (Sign::LateLight, 0.0),
-    (Sign::Impulse, 0.2),
-    (Sign::BurntOutEarly, 0.0),
-    (Sign::NoPlan, 0.5),
-    (Sign::Tumbles, 0.05),
-    (Sign::Gate, 0.0),
-    (Sign::Latched, 0.0),
-];
-
 /// A detected fault.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
@@ -128,7 +87,7 @@ pub struct Finding {
     /// The value it is compared with, or a second number.
     pub beside: f64,
     /// Additional text.
-    pub detail: String,
+    pub detail: Cow<'static, str>,
     /// Another finding explains it.
     pub follows: bool,
 }
@@ -141,7 +100,7 @@ impl Finding {
             Sign::Restart => format!("flight computer away for {value:.2} s"),
             Sign::Gnss => format!("GNSS lost for {value:.1} s"),
             Sign::Barometer => format!("barometer silent for {value:.1} s"),
-            Sign::Lidar => format!("lidar silent from {beside:.0} m down"),
+            Sign::Lidar => format!("lidar silent from {:.0} m down", LIDAR_SEES_M[1]),
             Sign::Implausible(sensor) => {
                 format!("{} sends no usable sample for {value:.2} s", name_of(sensor))
             }
@@ -173,20 +132,16 @@ impl Finding {
             Sign::Tumbles => format!("nose below the horizon in the burn: tilt {value:.0} deg"),
             Sign::Gate if detail.is_empty() => "ignition gate stayed shut".to_string(),
             Sign::Gate => format!("ignition gate stayed shut: {detail}"),
-            Sign::Latched => detail.clone(),
+            Sign::Latched => detail.to_string(),
         }
     }
-}
 
-/// A sign in one frame: since when, s, and the numbers of the finding.
-#[derive(Debug, Clone, Copy)]
-struct Hit {
-    since_s: f64,
-    /// Severity: the worst is stored.
-    size: f64,
-    value: f64,
-    beside: f64,
-    detail: &'static str,
+    fn severity(&self) -> f64 {
+        match self.sign {
+            Sign::Battery | Sign::Impulse => (self.value - self.beside).abs(),
+            _ => self.value.abs(),
+        }
+    }
 }
 
 /// A sign that is being watched.
@@ -199,19 +154,12 @@ struct SignWatch {
 }
 
 /// The findings of a flight.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Findings {
-    watcher: Option<Watcher>,
-    watches: [SignWatch; RULES.len()],
+    watcher: Watcher,
+    watches: BTreeMap<Sign, SignWatch>,
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
-}
-
-impl Default for Findings {
-    fn default() -> Self {
-        let watches = [SignWatch::default(); RULES.len()];
-        Self { watcher: None, watches, found: Vec::new(), thrust_over_weight: None }
-    }
 }
 
 impl Findings {
@@ -223,45 +171,35 @@ impl Findings {
     /// Looks at the computer after a frame.
     pub fn note(&mut self, computer: &Computer) {
         let Some((flown, estimate)) = computer.flown().zip(computer.pilot().estimate()) else { return };
-        let watcher = self.watcher.get_or_insert_with(|| Watcher::new(computer, &flown));
-        watcher.take(computer, &flown, estimate);
+        self.watcher.take(computer, &flown, estimate);
         if flown.contact && computer.pilot().ignited_at_s().is_some() && self.thrust_over_weight.is_none() {
             let (thrust_n, weight_n) = computer.pilot().thrust_and_weight_n(flown.time_s);
             self.thrust_over_weight = Some(thrust_n / weight_n);
         }
-        for ((sign, lasts_s), watch) in RULES.into_iter().zip(&mut self.watches) {
-            let Some(seen) = watcher.seen(sign, computer, &flown, estimate) else {
-                watch.since_s = None;
-                continue;
-            };
-            let since_s = *watch.since_s.get_or_insert(seen.since_s);
+        let seen = self.watcher.seen(computer, &flown, estimate);
+        for (sign, watch) in &mut self.watches {
+            watch.since_s = watch.since_s.filter(|_| seen.iter().any(|seen| seen.sign == *sign));
+        }
+        for mut seen in seen {
+            let watch = self.watches.entry(seen.sign).or_default();
+            seen.since_s = *watch.since_s.get_or_insert(seen.since_s);
+            seen.held_s = flown.time_s - seen.since_s;
             // A multiple of the frame is not exact.
-            if flown.time_s - since_s < lasts_s - 0.5 * FRAME_S {
+            if seen.held_s < seen.sign.lasts_s() - 0.5 * FRAME_S {
                 continue;
             }
-            let &mut place = watch.found.get_or_insert_with(|| {
-                let Hit { value, beside, detail, .. } = seen;
-                let gave_up = computer.pilot().gave_up().filter(|_| sign == Sign::Gate);
-                let detail = gave_up.unwrap_or(detail).to_string();
-                self.found.push(Finding {
-                    sign,
-                    since_s,
-                    held_s: flown.time_s - since_s,
-                    value,
-                    beside,
-                    detail,
-                    follows: false,
-                });
-                self.found.len() - 1
-            });
+            let place = *watch.found.get_or_insert(self.found.len());
+            if place == self.found.len() {
+                self.found.push(seen.clone());
+            }
             let finding = &mut self.found[place];
             finding.held_s += FRAME_S;
-            if matches!(sign, Sign::Surface(_)) && finding.detail != seen.detail {
-                finding.detail = seen.detail.to_string();
-            }
-            if seen.size > watch.worst {
-                watch.worst = seen.size;
+            if seen.severity() > watch.worst {
+                watch.worst = seen.severity();
                 (finding.value, finding.beside) = (seen.value, seen.beside);
+            }
+            if matches!(seen.sign, Sign::Surface(_)) {
+                finding.detail = seen.detail;
             }
         }
     }
@@ -289,6 +227,19 @@ impl Findings {
 }
 
 impl Sign {
+    /// Time for which it must last to become a finding, s. Shorter signs are noise, a dropped
+    /// sample or a gust.
+    fn lasts_s(self) -> f64 {
+        match self {
+            Self::HeightsDisagree | Self::Separation | Self::NoPlan => 0.5,
+            Self::Surface(fin) if usize::from(fin) >= GIMBALS => 0.3,
+            Self::RangesDisagree | Self::Estimate | Self::Impulse => 0.2,
+            Self::Surface(_) | Self::Battery => 0.1,
+            Self::Tumbles => 0.05,
+            _ => 0.0,
+        }
+    }
+
     /// Whether it is the motor's, whose measurement needs an intact inertial unit.
     fn of_motor(self) -> bool {
         matches!(self, Self::LateLight | Self::Impulse | Self::BurntOutEarly | Self::Latched)
@@ -375,10 +326,11 @@ const HEIGHTS_APART_M: f64 = 6.0;
 const PLANS_ABOVE_M: f64 = 2.0;
 
 /// Changes from one sample to the next that no motion makes: a quarter to a half more than the
-/// largest of 90 flights of three missions in `real` that stand. The gyro's in the burn is larger.
+/// largest of 90 flights of three missions in `real` that stand. The gyro's in the burn is larger:
+/// 20 in a landing of mk2.
 const JUMP: [f64; SENSORS.len()] = [3.6, 8.0, 4.0, 10.0, 1.0];
 const JUMP_UNITS: [&str; SENSORS.len()] = ["m/s2", "deg/s", "m", "m", "m"];
-const GYRO_JUMP_IN_BURN_DEG_S: f64 = 20.0;
+const GYRO_JUMP_IN_BURN_DEG_S: f64 = 25.0;
 /// Height below which legs touch the ground, m.
 const LEGS_M: f64 = 1.0;
 /// Longest time between two samples that are compared, s: inertial unit, barometer and lidar; GNSS.
@@ -402,7 +354,7 @@ const IMPLAUSIBLE_S: f64 = 0.02;
 const EXPLAINED_FRAMES: u32 = 12;
 const EXPLAINED_SHARE: f64 = 0.3;
 /// Explanations of a surface's motion: it follows another surface's command, or its own mirrored.
-const FOLLOWS: [&str; SURFACES + 3] = [
+const FOLLOWS: [&str; SURFACES + 1] = [
     ": takes gimbal pitch's commands",
     ": takes gimbal yaw's commands",
     ": takes fin 1's commands",
@@ -410,12 +362,7 @@ const FOLLOWS: [&str; SURFACES + 3] = [
     ": takes fin 3's commands",
     ": takes fin 4's commands",
     ": moves the wrong way",
-    ": does not move",
-    ": too slow",
 ];
-const MIRRORED: usize = SURFACES;
-const HELD: usize = SURFACES + 1;
-const LAGS: usize = SURFACES + 2;
 
 /// How a surface moves while it does not follow its commands.
 #[derive(Debug, Clone, Copy, Default)]
@@ -437,18 +384,24 @@ impl Motion {
             return "";
         }
         let limit = EXPLAINED_SHARE * EXPLAINED_SHARE * self.off_rad2[own];
-        let best = (0..=MIRRORED).filter(|place| *place != own && self.off_rad2[*place] < limit);
+        let best = (0..FOLLOWS.len()).filter(|place| *place != own && self.off_rad2[*place] < limit);
         let best = best.min_by(|a, b| self.off_rad2[*a].total_cmp(&self.off_rad2[*b]));
         let width_rad = self.span_rad.map_or(0.0, |[low, high]| high - low);
-        let is_held = width_rad < 0.5 * AWAY_RAD[usize::from(own >= GIMBALS)];
         let [towards_rad, all_rad] = self.turned_rad;
-        let held = is_held.then_some(HELD);
-        held.or(best).or((towards_rad > 0.8 * all_rad).then_some(LAGS)).map_or("", |place| FOLLOWS[place])
+        if width_rad < 0.5 * AWAY_RAD[usize::from(own >= GIMBALS)] {
+            ": does not move"
+        } else if let Some(best) = best {
+            FOLLOWS[best]
+        } else if towards_rad > 0.8 * all_rad {
+            ": too slow"
+        } else {
+            ""
+        }
     }
 }
 
 /// Steps of the sensors that the estimated motion does not explain.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Steps {
     imu: Option<ImuSample>,
     /// Changes of the last three inertial samples, the newest last: across the nose, m/s^2, where
@@ -458,9 +411,9 @@ struct Steps {
     range_m: Option<(f64, f64)>,
     jumping_ranges: f64,
     /// Velocity gained by the inertial unit since the first frame, m/s; the same of the last
-    /// frames.
+    /// frames, the newest first.
     gained_m_s: Vector3<f64>,
-    history_m_s: [Vector3<f64>; HISTORY],
+    history_m_s: VecDeque<Vector3<f64>>,
     fix: Option<(GnssFix, Vector3<f64>)>,
     /// Sum of the motion of the fixes beyond their velocities, m, which is forgotten.
     moved_m: Vector3<f64>,
@@ -469,32 +422,8 @@ struct Steps {
     /// the times of their fixes, s.
     apart_m_s: [Vector3<f64>; APART_FIXES],
     fixed_at_s: [f64; APART_FIXES],
-    /// Frames taken.
-    frames: usize,
     /// Step of each sensor in this frame, with its time, s, and unit; and that of [`Sign::Apart`].
     found: [Option<(f64, f64, &'static str)>; SENSORS.len() + 1],
-}
-
-impl Default for Steps {
-    fn default() -> Self {
-        let zero = Vector3::zeros();
-        Self {
-            imu: None,
-            changes: [[0.0; 5]; 3],
-            pressure_m: None,
-            range_m: None,
-            jumping_ranges: 0.0,
-            gained_m_s: zero,
-            history_m_s: [zero; HISTORY],
-            fix: None,
-            moved_m: zero,
-            moved_fixes: 0,
-            apart_m_s: [zero; APART_FIXES],
-            fixed_at_s: [0.0; APART_FIXES],
-            frames: 0,
-            found: [None; SENSORS.len() + 1],
-        }
-    }
 }
 
 impl Steps {
@@ -543,14 +472,13 @@ impl Steps {
         }
         if !measured.imu.is_plausible() {
             // What was gained is unknown: the fixes begin again.
-            self.frames = 0;
+            self.history_m_s.clear();
             return;
         }
         self.gained_m_s +=
             (estimate.state.world_from_body * force_m_s2 - Vector3::z() * GRAVITY_M_S2) * FRAME_S;
-        self.history_m_s.rotate_left(1);
-        self.history_m_s[HISTORY - 1] = self.gained_m_s;
-        self.frames += 1;
+        self.history_m_s.truncate(HISTORY - 1);
+        self.history_m_s.push_front(self.gained_m_s);
         if let Some(fix) = measured.gnss {
             self.take_fix(fix, time_s);
         }
@@ -563,11 +491,10 @@ impl Steps {
     fn take_fix(&mut self, fix: GnssFix, time_s: f64) {
         let frames = libm::round((time_s - fix.valid_at_s) / FRAME_S).max(0.0) as usize;
         let repeats = self.fix.is_some_and(|(before, _)| before.position_m == fix.position_m);
-        if frames >= self.frames.min(HISTORY) || repeats {
+        let Some(gained_m_s) = self.history_m_s.get(frames).copied().filter(|_| !repeats) else {
             (self.fix, self.fixed_at_s) = (None, [0.0; APART_FIXES]);
             return;
-        }
-        let gained_m_s = self.history_m_s[HISTORY - 1 - frames];
+        };
         let Some((before, before_m_s)) = self.fix.replace((fix, gained_m_s)) else { return };
         let passed_s = fix.valid_at_s - before.valid_at_s;
         if !(0.0..NEXT_FIX_S).contains(&passed_s) || passed_s <= 0.0 {
@@ -602,29 +529,32 @@ impl Steps {
     }
 }
 
+/// Reports a sign of this frame: since when, s, its value and what it is compared with, and text.
+type See<'a> = &'a mut dyn FnMut(Sign, f64, f64, f64, &'static str);
+
 /// Memory of the rules from earlier frames.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Watcher {
-    frame: u64,
+    frame: Option<u64>,
     /// Frames that are missing before this one.
     missing: u64,
     /// Satellites were received after the boost.
     gnss_since_boost: bool,
     /// The barometer's last altitude, m.
     pressure_m: Option<f64>,
-    surfaces: [ServoModel; SURFACES],
+    surfaces: Option<[ServoModel; SURFACES]>,
     motions: [Motion; SURFACES],
     steps: Steps,
     /// Gimbal angles in the frame before, rad.
-    gimbal_rad: [f64; 2],
+    gimbal_rad: Option<[f64; 2]>,
     /// In the burn: the number of frames in which each axis had to turn fast, and the largest turn
     /// in one frame, rad.
     turns: [(u32, f64); 2],
     /// Specific force along the nose over the boost, m/s.
     boost_m_s: f64,
     ejected_s: Option<f64>,
-    /// Time at which the separation charge was fired.
-    parted_s: Option<f64>,
+    /// The separation charge was fired.
+    parted: bool,
     /// Time since when the lidar must measure, s.
     must_see_s: Option<f64>,
     /// The attitude was off-nominal in the burn: from then on the axial force says little about the
@@ -635,37 +565,13 @@ struct Watcher {
 }
 
 impl Watcher {
-    fn new(computer: &Computer, flown: &SensedInput) -> Self {
-        let airframe = &computer.pilot().mission().airframe;
-        Self {
-            frame: flown.frame.saturating_sub(1),
-            missing: 0,
-            gnss_since_boost: false,
-            pressure_m: None,
-            surfaces: ServoModel::of_each(airframe, surfaces_rad(flown.gimbal_rad, flown.fins_rad)),
-            motions: [Motion::default(); SURFACES],
-            steps: Steps::default(),
-            gimbal_rad: flown.gimbal_rad,
-            turns: [(0, 0.0); 2],
-            boost_m_s: 0.0,
-            ejected_s: None,
-            parted_s: None,
-            must_see_s: None,
-            astray: false,
-            down: false,
-        }
-    }
-
     fn take(&mut self, computer: &Computer, flown: &SensedInput, estimate: &Estimate) {
-        self.missing = flown.frame.saturating_sub(self.frame + 1);
-        self.frame = flown.frame;
+        let before = self.frame.replace(flown.frame);
+        self.missing = before.map_or(0, |before| flown.frame.saturating_sub(before + 1));
         let (time_s, phase) = (flown.time_s, computer.mode().phase);
         if self.missing > 0 {
             // Commands and measurements of missing frames are not available.
-            let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
-            self.surfaces = ServoModel::of_each(&computer.pilot().mission().airframe, at_rad);
-            self.gimbal_rad = flown.gimbal_rad;
-            self.steps = Steps::default();
+            (self.surfaces, self.gimbal_rad, self.steps) = (None, None, Steps::default());
         }
         self.pressure_m = flown.measured.pressure_altitude_m.or(self.pressure_m);
         if flown.measured.gnss.is_some() {
@@ -674,28 +580,10 @@ impl Watcher {
         if phase == Phase::Boost {
             self.boost_m_s += flown.measured.imu.specific_force_m_s2.x * FRAME_S;
         }
-        let commands = computer.commands();
-        let told_rad = surfaces_rad(commands.gimbal_rad, commands.fins_rad);
-        let before_rad = self.surfaces.each_ref().map(|servo| servo.at_rad);
-        for (servo, command_rad) in self.surfaces.iter_mut().zip(told_rad) {
-            servo.advance();
-            servo.take(command_rad);
-        }
-        self.take_motions(computer, flown);
-        let slow_rad = SLOW * computer.pilot().mission().airframe.gimbal.servo.rate_rad_s() * FRAME_S;
-        for axis in (0..GIMBALS).filter(|_| phase == Phase::Powered && !self.down) {
-            let (frames, turned_rad) = &mut self.turns[axis];
-            *frames += u32::from((self.surfaces[axis].at_rad - before_rad[axis]).abs() > slow_rad);
-            *turned_rad = turned_rad.max((flown.gimbal_rad[axis] - self.gimbal_rad[axis]).abs());
-        }
-        self.gimbal_rad = flown.gimbal_rad;
-        for (output, since_s) in
-            [(PyroOutput::Parachute, &mut self.ejected_s), (PyroOutput::Separation, &mut self.parted_s)]
-        {
-            if commands.outputs.is_on(output) {
-                since_s.get_or_insert(time_s);
-            }
-        }
+        self.take_surfaces(computer, flown);
+        let outputs = &computer.commands().outputs;
+        self.parted |= outputs.is_on(PyroOutput::Separation);
+        self.ejected_s = self.ejected_s.or(outputs.is_on(PyroOutput::Parachute).then_some(time_s));
         let nose_up = estimate.state.nose_in_world().z;
         let near = estimate.state.position_m.z <= LIDAR_SEES_M[1] * nose_up && nose_up > LIDAR_COS_TILT;
         self.down |= flown.contact && !phase.before_apogee();
@@ -704,12 +592,27 @@ impl Watcher {
         self.steps.take(flown, estimate, phase, near);
     }
 
-    /// Compares surfaces that do not follow their commands with what would explain it.
-    fn take_motions(&mut self, computer: &Computer, flown: &SensedInput) {
-        let fins = &computer.pilot().mission().airframe.fins;
-        let both_stops_rad = fins.closed_rad() + fins.open_rad();
+    /// Follows the surfaces' models, and compares surfaces that do not follow their commands with
+    /// what would explain it.
+    fn take_surfaces(&mut self, computer: &Computer, flown: &SensedInput) {
+        let (airframe, commands) = (&computer.pilot().mission().airframe, computer.commands());
+        let told_rad = surfaces_rad(commands.gimbal_rad, commands.fins_rad);
         let measured_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad);
-        let model_rad = self.surfaces.each_ref().map(|servo| servo.at_rad);
+        let servos = self.surfaces.get_or_insert_with(|| ServoModel::of_each(airframe, measured_rad));
+        let before_rad = servos.each_ref().map(|servo| servo.at_rad);
+        for (servo, command_rad) in servos.iter_mut().zip(told_rad) {
+            servo.advance();
+            servo.take(command_rad);
+        }
+        let model_rad = servos.each_ref().map(|servo| servo.at_rad);
+        let slow_rad = SLOW * airframe.gimbal.servo.rate_rad_s() * FRAME_S;
+        let gimbal_before_rad = self.gimbal_rad.replace(flown.gimbal_rad).unwrap_or(flown.gimbal_rad);
+        for axis in (0..GIMBALS).filter(|_| computer.mode().phase == Phase::Powered && !self.down) {
+            let (frames, turned_rad) = &mut self.turns[axis];
+            *frames += u32::from((model_rad[axis] - before_rad[axis]).abs() > slow_rad);
+            *turned_rad = turned_rad.max((flown.gimbal_rad[axis] - gimbal_before_rad[axis]).abs());
+        }
+        let both_stops_rad = airframe.fins.closed_rad() + airframe.fins.open_rad();
         for (own, (motion, at_rad)) in self.motions.iter_mut().zip(measured_rad).enumerate() {
             let is_fin = own >= GIMBALS;
             let off_rad = at_rad - model_rad[own];
@@ -735,176 +638,154 @@ impl Watcher {
         }
     }
 
-    /// Whether a sign shows in this frame.
-    fn seen(&self, sign: Sign, computer: &Computer, last: &SensedInput, estimate: &Estimate) -> Option<Hit> {
-        let (phase, time_s) = (computer.mode().phase, last.time_s);
-        let pilot = computer.pilot();
-        let mission = pilot.mission();
-        let in_air = !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down;
-        let now = |value: f64, beside| Hit { since_s: time_s, size: value, value, beside, detail: "" };
-        let [barometer_s, gnss_s, _] = computer.sensors().silent_s();
-        let silent = |silent_s: f64, longest_s: f64| {
-            (in_air && silent_s > longest_s)
-                .then_some(Hit { since_s: time_s - silent_s, ..now(silent_s, 0.0) })
+    /// The signs of this frame.
+    fn seen(&self, computer: &Computer, flown: &SensedInput, estimate: &Estimate) -> Vec<Finding> {
+        let phase = computer.mode().phase;
+        let mut seen = Vec::new();
+        let mut see = |sign, since_s, value, beside, detail: &'static str| {
+            let detail = Cow::Borrowed(detail);
+            seen.push(Finding { sign, since_s, held_s: 0.0, value, beside, detail, follows: false });
         };
-        match sign {
-            Sign::Restart => {
-                let away_s = self.missing as f64 * FRAME_S;
-                (in_air && self.missing > 1).then(|| Hit { since_s: time_s - away_s, ..now(away_s, 0.0) })
+        if !phase.on_pad() && !matches!(phase, Phase::Touchdown | Phase::Safed) && !self.down {
+            self.see_sensors(computer, flown, estimate, &mut see);
+            self.see_actuators(computer, flown, &mut see);
+            self.see_motors(computer, flown, estimate, &mut see);
+        }
+        let gave_up = computer.pilot().gave_up();
+        let latched = computer.latch().map(|latch| match latch {
+            Latch::Gate => (Sign::Gate, ""),
+            Latch::Commanded => (Sign::Latched, "abort of the crew"),
+            Latch::UncommandedLiftOff => (Sign::Latched, "lifted off unarmed"),
+            Latch::UncommandedRelease => (Sign::Latched, "released without clearance"),
+            Latch::NoSeparation => (Sign::Latched, "abort: the booster stayed on"),
+            Latch::NoLight => (Sign::Latched, "landing motor did not light in time"),
+            Latch::Other => (Sign::Latched, "ascent motor did not lift the vehicle off"),
+        });
+        if let Some((sign, words)) = latched {
+            see(sign, flown.time_s, 0.0, 0.0, words);
+        }
+        // The pilot has the reason for an abandoned landing.
+        if let Some((finding, gave_up)) = seen.last_mut().filter(|last| last.sign == Sign::Gate).zip(gave_up)
+        {
+            finding.detail = Cow::Owned(gave_up.to_owned());
+        }
+        seen
+    }
+
+    fn see_sensors(&self, computer: &Computer, flown: &SensedInput, estimate: &Estimate, see: See<'_>) {
+        let (pilot, sensors) = (computer.pilot(), computer.sensors());
+        let (phase, time_s) = (computer.mode().phase, flown.time_s);
+        let (height_m, nose_up) = (estimate.state.position_m.z, estimate.state.nose_in_world().z);
+        let falls = phase.in_descent() || phase.in_landing_burn();
+        let climbs = phase == Phase::Boost || !self.gnss_since_boost && pilot.mission().launch.is_some();
+        let mut silent = |sign, silent_s: f64, longest_s: f64| {
+            if silent_s > longest_s {
+                see(sign, time_s - silent_s, silent_s, 0.0, "");
             }
-            Sign::Gnss => {
-                let climbs = phase == Phase::Boost || !self.gnss_since_boost && mission.launch.is_some();
-                silent(gnss_s, if climbs { GNSS_LOST_IN_BOOST_S } else { GNSS_LOST_S })
+        };
+        let [barometer_s, gnss_s, lidar_s] = sensors.silent_s();
+        silent(Sign::Restart, self.missing as f64 * FRAME_S, 1.5 * FRAME_S);
+        silent(Sign::Gnss, gnss_s, if climbs { GNSS_LOST_IN_BOOST_S } else { GNSS_LOST_S });
+        silent(Sign::Barometer, barometer_s, BAROMETER_LOST_S);
+        if let Some(since_s) = self.must_see_s.filter(|_| falls && height_m >= LIDAR_SEES_M[0]) {
+            silent(Sign::Lidar, lidar_s.min(time_s - since_s), LIDAR_LOST_S);
+        }
+        for (sensor, [silent_s, repeats_s]) in (ACCELEROMETER..).zip(sensors.lost_s()) {
+            if sensor <= GYRO {
+                silent(Sign::Implausible(sensor), silent_s, IMPLAUSIBLE_S);
             }
-            Sign::Barometer => silent(barometer_s, BAROMETER_LOST_S),
-            Sign::Gate | Sign::Latched => {
-                let detail = latched(computer.latch()?, sign)?;
-                Some(Hit { detail, ..now(0.0, 0.0) })
+            silent(Sign::Repeats(sensor), repeats_s, 0.0);
+        }
+        for (sensor, step) in (ACCELEROMETER..).zip(self.steps.found) {
+            if let Some((step, at_s, unit)) = step.filter(|_| height_m >= LEGS_M) {
+                see(if sensor <= LIDAR { Sign::Jumps(sensor) } else { Sign::Apart }, at_s, step, 0.0, unit);
             }
-            _ if in_air => seen_in_flight(self, sign, computer, last, estimate),
-            _ => None,
+        }
+        // A rejected barometer is no longer a source of heights.
+        let apart_m = (estimate.heights.disagreement_m())
+            .or_else(|| Some((self.pressure_m? - height_m).abs()))
+            .filter(|apart_m| falls && *apart_m > HEIGHTS_APART_M);
+        if let Some(apart_m) = apart_m {
+            see(Sign::HeightsDisagree, time_s, apart_m, 0.0, "");
+        }
+        if let Some((range_m, measured_s)) = self.steps.range_m.filter(|_| self.must_see_s.is_some())
+            && time_s - measured_s < NEXT_SAMPLE_S
+            && pilot.estimator().others_contradict_m(range_m * nose_up)
+        {
+            see(Sign::RangesDisagree, time_s, (range_m * nose_up - height_m).abs(), 0.0, "");
+        }
+        if let (Health::Unhealthy(issue), true) = (estimate.health, phase.is_landing()) {
+            see(Sign::Estimate, time_s, 0.0, 0.0, issue.name());
         }
     }
-}
 
-/// A sign that only a vehicle in the air has.
-fn seen_in_flight(
-    watcher: &Watcher,
-    sign: Sign,
-    computer: &Computer,
-    flown: &SensedInput,
-    estimate: &Estimate,
-) -> Option<Hit> {
-    let (pilot, mode, time_s) = (computer.pilot(), computer.mode(), flown.time_s);
-    let (mission, motor) = (pilot.mission(), pilot.motor());
-    let burns = mode.phase == Phase::Powered;
-    let tilt_rad = libm::acos(estimate.state.nose_in_world().z.clamp(-1.0, 1.0));
-    let height_m = estimate.state.position_m.z;
-    let seen = |since_s, value: f64, beside, detail| Hit { since_s, size: value, value, beside, detail };
-    let now = |value, beside| seen(time_s, value, beside, "");
-    match sign {
-        Sign::Lidar => {
-            let [low_m, high_m] = LIDAR_SEES_M;
-            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
-            let must_see_s = watcher.must_see_s.filter(|_| falls && height_m >= low_m)?;
-            let [_, _, lidar_s] = computer.sensors().silent_s();
-            let silent_s = lidar_s.min(time_s - must_see_s);
-            (silent_s > LIDAR_LOST_S).then(|| seen(time_s - silent_s, silent_s, high_m, ""))
+    fn see_actuators(&self, computer: &Computer, flown: &SensedInput, see: See<'_>) {
+        let (time_s, measured_rad) = (flown.time_s, surfaces_rad(flown.gimbal_rad, flown.fins_rad));
+        for (surface, servo) in (0..).zip(self.surfaces.iter().flatten()) {
+            let own = usize::from(surface);
+            let away_rad = (measured_rad[own] - servo.at_rad).abs();
+            if away_rad > AWAY_RAD[usize::from(own >= GIMBALS)] {
+                let [away_deg, at_deg] = [away_rad, measured_rad[own]].map(f64::to_degrees);
+                see(Sign::Surface(surface), time_s, away_deg, at_deg, self.motions[own].explained(own));
+            }
         }
-        Sign::Implausible(sensor) => {
-            let [silent_s, _] = computer.sensors().lost_s()[usize::from(sensor)];
-            (silent_s > IMPLAUSIBLE_S).then(|| seen(time_s - silent_s, silent_s, 0.0, ""))
+        let servo = &computer.pilot().mission().airframe.gimbal.servo;
+        let turns = self.turns.iter().filter(|(frames, _)| *frames >= SLOW_FRAMES);
+        let fastest_rad_s = turns.map(|(_, turned_rad)| turned_rad / FRAME_S).reduce(f64::min);
+        if let Some(rate_rad_s) = fastest_rad_s.filter(|rate_rad_s| *rate_rad_s < SLOW * servo.rate_rad_s()) {
+            see(Sign::SlowGimbal, time_s, rate_rad_s.to_degrees(), servo.rate_deg_s, "");
         }
-        Sign::Repeats(sensor) => {
-            let [_, repeats_s] = computer.sensors().lost_s()[usize::from(sensor)];
-            (repeats_s > 0.0).then(|| seen(time_s - repeats_s, repeats_s, 0.0, ""))
+        if let Some(volts) = flown.battery_v.filter(|volts| *volts < BATTERY_LOW_V) {
+            see(Sign::Battery, time_s, volts, BATTERY_LOW_V, "");
         }
-        Sign::Jumps(_) | Sign::Apart if height_m < LEGS_M => None,
-        Sign::Jumps(sensor) => {
-            let (jump, at_s, unit) = watcher.steps.found[usize::from(sensor)]?;
-            Some(Hit { size: jump.abs(), ..seen(at_s, jump, 0.0, unit) })
-        }
-        Sign::Apart => {
-            let (apart_m_s, at_s, _) = watcher.steps.found[SENSORS.len()]?;
-            Some(seen(at_s, apart_m_s, 0.0, ""))
-        }
-        Sign::RangesDisagree => {
-            let (range_m, measured_s) = watcher.steps.range_m.filter(|_| watcher.must_see_s.is_some())?;
-            let range_height_m = range_m * estimate.state.nose_in_world().z;
-            (time_s - measured_s < NEXT_SAMPLE_S && pilot.estimator().others_contradict_m(range_height_m))
-                .then(|| now((range_height_m - height_m).abs(), 0.0))
-        }
-        Sign::HeightsDisagree => {
-            let falls = mode.phase.in_descent() || mode.phase.in_landing_burn();
-            // A rejected barometer is no longer a source of heights.
-            let apart_m = (estimate.heights.disagreement_m())
-                .or_else(|| Some((watcher.pressure_m? - height_m).abs()))
-                .filter(|_| falls)?;
-            (apart_m > HEIGHTS_APART_M).then(|| now(apart_m, 0.0))
-        }
-        Sign::Estimate => match estimate.health {
-            Health::Unhealthy(issue) if mode.phase.is_landing() => Some(seen(time_s, 0.0, 0.0, issue.name())),
-            _ => None,
-        },
-        Sign::Surface(surface) => {
-            let surface = usize::from(surface);
-            let at_rad = surfaces_rad(flown.gimbal_rad, flown.fins_rad)[surface];
-            let away_rad = (at_rad - watcher.surfaces[surface].at_rad).abs();
-            (away_rad > AWAY_RAD[usize::from(surface >= GIMBALS)]).then(|| Hit {
-                detail: watcher.motions[surface].explained(surface),
-                ..now(away_rad.to_degrees(), at_rad.to_degrees())
-            })
-        }
-        Sign::SlowGimbal => {
-            let servo = &mission.airframe.gimbal.servo;
-            let turns = watcher.turns.iter().filter(|(frames, _)| *frames >= SLOW_FRAMES);
-            let rate_rad_s = turns.map(|(_, turned_rad)| turned_rad / FRAME_S).reduce(f64::min)?;
-            (rate_rad_s < SLOW * servo.rate_rad_s()).then(|| now(rate_rad_s.to_degrees(), servo.rate_deg_s))
-        }
-        Sign::Battery => {
-            let volts = flown.battery_v.filter(|volts| *volts < BATTERY_LOW_V)?;
-            Some(Hit { size: BATTERY_LOW_V - volts, ..now(volts, BATTERY_LOW_V) })
-        }
-        Sign::AscentMotor => {
-            let booster = &mission.launch.as_ref()?.booster;
+    }
+
+    fn see_motors(&self, computer: &Computer, flown: &SensedInput, estimate: &Estimate, see: See<'_>) {
+        let (pilot, phase, time_s) = (computer.pilot(), computer.mode().phase, flown.time_s);
+        let (mission, motor) = (pilot.mission(), pilot.motor());
+        let burns = phase == Phase::Powered;
+        if let Some(launch) = mission.launch.as_ref().filter(|_| phase == Phase::Coast) {
+            let booster = &launch.booster;
             let burnt_kg = 0.5 * booster.motor_curve.propellant_mass_kg();
             let mass_kg = mission.airframe.mass.loaded_kg + booster.dry_kg + burnt_kg;
-            let share = watcher.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
-            let sensed = mode.phase == Phase::Coast;
-            (sensed && share < ASCENT_WEAK).then(|| now(share, 1.0))
+            let share = self.boost_m_s * mass_kg / booster.motor_curve.total_impulse_n_s();
+            if share < ASCENT_WEAK {
+                see(Sign::AscentMotor, time_s, share, 1.0, "");
+            }
         }
-        Sign::Separation => (flown.booster_attached && watcher.parted_s.is_some()).then(|| now(1.0, 0.0)),
-        Sign::Parachute => {
-            let sinks_m_s = -estimate.state.velocity_m_s.z;
-            let since_s = watcher.ejected_s? + CHUTE_FILLS_S;
-            (time_s > since_s && sinks_m_s > CHUTE_CARRIES_M_S).then(|| now(sinks_m_s, CHUTE_CARRIES_M_S))
+        if flown.booster_attached && self.parted {
+            see(Sign::Separation, time_s, 1.0, 0.0, "");
         }
-        Sign::LateLight => {
-            // The shock of an impact is shorter than any burn.
-            let took_s =
-                motor.ignition_s().filter(|lit_s| time_s - lit_s > SHOCK_S)? - pilot.ignited_at_s()?;
-            let known_s = mission.ignition.delay_s;
-            (took_s > known_s + LATE_S)
-                .then(|| seen(pilot.ignited_at_s().unwrap_or(time_s), took_s, known_s, ""))
+        let sinks_m_s = -estimate.state.velocity_m_s.z;
+        if self.ejected_s.is_some_and(|at_s| time_s > at_s + CHUTE_FILLS_S) && sinks_m_s > CHUTE_CARRIES_M_S {
+            see(Sign::Parachute, time_s, sinks_m_s, CHUTE_CARRIES_M_S, "");
         }
-        Sign::Impulse => {
-            let sigma = motor.sigmas()[0];
-            let impulse = pilot.motor().impulse_scale();
-            let off = (impulse - 1.0).abs();
-            let known = burns
-                && !watcher.astray
-                && off > IMPULSE_SIGMAS * mission.motor.impulse_sigma
-                && off > 2.0 * sigma;
-            let lit_s = motor.ignition_s().unwrap_or(time_s);
-            known.then(|| Hit { size: off, ..seen(lit_s, impulse, 1.0, "") })
+        // The shock of an impact is shorter than any burn.
+        let lit_s = motor.ignition_s().filter(|lit_s| time_s - lit_s > SHOCK_S);
+        let delay_s = mission.ignition.delay_s;
+        if let Some((lit_s, ignited_at_s)) = lit_s.zip(pilot.ignited_at_s())
+            && lit_s - ignited_at_s > delay_s + LATE_S
+        {
+            see(Sign::LateLight, ignited_at_s, lit_s - ignited_at_s, delay_s, "");
         }
-        Sign::BurntOutEarly => {
-            let MotorStage::EndedEarly { at_s } = motor.stage() else { return None };
-            let ends_s =
-                motor.ignition_s()? + motor.burn_time_stretch() * pilot.mission().motor_curve.burn_time_s();
-            (ends_s - at_s > EARLY_S).then(|| seen(at_s, ends_s - at_s, 0.0, ""))
+        let (impulse, sigma) = (motor.impulse_scale(), motor.sigmas()[0]);
+        let normal = (IMPULSE_SIGMAS * mission.motor.impulse_sigma).max(2.0 * sigma);
+        if burns && !self.astray && (impulse - 1.0).abs() > normal {
+            see(Sign::Impulse, motor.ignition_s().unwrap_or(time_s), impulse, 1.0, "");
         }
-        Sign::NoPlan => {
-            let none = computer.level() == ControlLevel::Stabiliser;
-            (burns && none && height_m > PLANS_ABOVE_M).then(|| now(1.0, 0.0))
+        if let (MotorStage::EndedEarly { at_s }, Some(lit_s)) = (motor.stage(), motor.ignition_s()) {
+            let early_s = lit_s + motor.burn_time_stretch() * mission.motor_curve.burn_time_s() - at_s;
+            if early_s > EARLY_S {
+                see(Sign::BurntOutEarly, at_s, early_s, 0.0, "");
+            }
         }
-        Sign::Tumbles => {
-            (burns && tilt_rad > core::f64::consts::FRAC_PI_2).then(|| now(tilt_rad.to_degrees(), 90.0))
+        let no_plan = computer.level() == ControlLevel::Stabiliser;
+        if burns && no_plan && estimate.state.position_m.z > PLANS_ABOVE_M {
+            see(Sign::NoPlan, time_s, 1.0, 0.0, "");
         }
-        Sign::Restart | Sign::Gnss | Sign::Barometer | Sign::Gate | Sign::Latched => None,
+        let tilt_deg = estimate.state.tilt_rad().to_degrees();
+        if burns && tilt_deg > 90.0 {
+            see(Sign::Tumbles, time_s, tilt_deg, 90.0, "");
+        }
     }
-}
-
-/// The latch as text; the pilot has the reason for an abandoned landing.
-fn latched(latch: Latch, sign: Sign) -> Option<&'static str> {
-    let words = match latch {
-        Latch::Gate => "",
-        Latch::Commanded => "abort of the crew",
-        Latch::UncommandedLiftOff => "lifted off unarmed",
-        Latch::UncommandedRelease => "released without clearance",
-        Latch::NoSeparation => "abort: the booster stayed on",
-        Latch::NoLight => "landing motor did not light in time",
-        Latch::Other => "ascent motor did not lift the vehicle off",
-    };
-    ((latch == Latch::Gate) == (sign == Sign::Gate)).then_some(words)
 }

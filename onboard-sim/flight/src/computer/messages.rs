@@ -104,9 +104,9 @@ impl Readiness {
 // Reports each change of the landing motor's state to the crew: the safety of anyone who approaches
 // the vehicle depends on it.
 
-/// The state last reported to the crew.
+/// Monitors the landing motor's state: the state last reported to the crew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-struct LastReported {
+pub(super) struct MotorWatch {
     status: MotorStatus,
     /// On the ground after the flight.
     landed: bool,
@@ -114,14 +114,10 @@ struct LastReported {
     free: bool,
 }
 
-/// Monitors the landing motor's state.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct MotorWatch(LastReported);
-
 impl Default for MotorWatch {
     /// A vehicle at power-up, with its pin in.
     fn default() -> Self {
-        Self(LastReported { status: MotorStatus::PinIn, landed: false, free: true })
+        Self { status: MotorStatus::PinIn, landed: false, free: true }
     }
 }
 
@@ -129,38 +125,38 @@ impl MotorWatch {
     /// Returns a message if the state has changed.
     pub(super) fn update(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
         use MotorStatus as M;
-        let now = LastReported {
+        let now = Self {
             status: mode.motor_status(time_s),
             landed: matches!(mode.phase, Phase::Touchdown | Phase::Safed),
             free: mode.approach_wait_s(time_s) == Some(0.0),
         };
-        let before = core::mem::replace(&mut self.0, now);
+        let before = core::mem::replace(self, now);
         if now == before {
             return None;
         }
         let (severity, words) = match now {
-            LastReported { status: M::Live, landed: true, free: false } => {
+            Self { status: M::Live, landed: true, free: false } => {
                 let words = format!("LIVE MOTOR: do not approach for {MISFIRE_WAIT_S} s, then pin first");
                 return Some((Severity::Critical, words));
             }
-            LastReported { status: M::Live, landed: true, free: true } => {
+            Self { status: M::Live, landed: true, free: true } => {
                 (Severity::Critical, "LIVE MOTOR: the wait is over; put the pin in before anything else")
             }
             // Every other state is reported once, when the status changes.
             _ if now.status == before.status => return None,
-            LastReported { status: M::Hot, .. } => {
+            Self { status: M::Hot, .. } => {
                 return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
             }
-            LastReported { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
+            Self { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
                 (Severity::Info, "pin out: landing motor live")
             }
-            LastReported { status: M::Live, landed: false, .. } => {
+            Self { status: M::Live, landed: false, .. } => {
                 (Severity::Critical, "landing motor live: no light")
             }
-            LastReported { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
-            LastReported { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
+            Self { status: M::PinIn, .. } => (Severity::Notice, "pin in: the igniter line is cut"),
+            Self { status: M::Burnt, .. } => (Severity::Notice, "landing motor burnt out and cooled"),
             // Reported at the ignition command.
-            LastReported { status: M::Burning, .. } => return None,
+            Self { status: M::Burning, .. } => return None,
         };
         Some((severity, words.to_owned()))
     }

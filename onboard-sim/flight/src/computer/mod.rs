@@ -43,7 +43,7 @@ use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
 use self::table::PhaseTable;
 use crate::control::servo::ServoModel;
-use crate::estimation::estimator::{ImuSample, Measurements};
+use crate::estimation::estimator::Measurements;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::estimation::spikes::SpikeFilter;
 use crate::guidance::powered::ControlLevel;
@@ -122,7 +122,7 @@ impl Computer {
         let measured = &mut input.sensed.measured;
         measured.pressure_altitude_m = self.pressure.take(measured.pressure_altitude_m, input.sensed.time_s);
         let input = &input;
-        self.table.begin(input.time_s);
+        self.table.time_s = input.time_s;
         self.report_changes(input);
         self.input = input.sensed;
         let Self { commands: Commands { fins_rad: commanded_rad, .. }, fins_zero_rad: zero_rad, .. } = self;
@@ -215,8 +215,7 @@ impl Computer {
         let fins = &airframe.fins;
         let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
         let stand_open = input.fins_rad.iter().all(|fin_rad| libm::sin(*fin_rad) >= HATCH_FREE_SINE);
-        airframe.servos_tell && stand_open
-            || self.table.time_s() - self.table.mode().entered_at_s >= opening_s
+        airframe.servos_tell && stand_open || self.table.time_s - self.table.mode().entered_at_s >= opening_s
     }
 
     /// Reports changes in the input: the pin, and a log that has stopped.
@@ -254,7 +253,7 @@ impl Computer {
 
     /// Applies changes that depend on time alone: the end of a hold, a cooled motor, safing.
     fn apply_timeouts(&mut self) {
-        let (mode, time_s) = (*self.table.mode(), self.table.time_s());
+        let (mode, time_s) = (*self.table.mode(), self.table.time_s);
         if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
             let words = format!("held for {HOLD_LIMIT_S} s without a new start");
             self.table.report(Severity::Warning, words);
@@ -308,7 +307,7 @@ impl Computer {
     /// Safing depends on the motor and may follow much later, or never.
     pub fn is_over(&self) -> bool {
         let mode = self.table.mode();
-        let in_phase_s = self.table.time_s() - mode.entered_at_s;
+        let in_phase_s = self.table.time_s - mode.entered_at_s;
         match mode.phase {
             Phase::Touchdown => in_phase_s >= AT_REST_S && mode.motor != Motor::Burning,
             Phase::Safed => true,
@@ -371,17 +370,12 @@ pub fn flight_time_s(frame: u64) -> f64 {
 
 // The input of one frame: everything a frame depends on besides the computer's memory.
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct LogState {
     /// The log is being written, or the operator has chosen to fly without one.
     pub running: bool,
     /// Free space for the log, bytes.
     pub space_bytes: u64,
-}
-
-impl LogState {
-    /// No log yet.
-    pub const NONE: Self = Self { running: false, space_bytes: 0 };
 }
 
 /// Result of a rehearsed landing, [planned](Computer::rehearse) or flown in a simulated world.
@@ -437,7 +431,7 @@ impl Deref for Input<'_> {
 }
 
 /// The part of a frame's input that is stored until the next frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SensedInput {
     /// Number of the frame since power-up.
     pub frame: u64,
@@ -466,24 +460,6 @@ pub struct SensedInput {
 }
 
 impl SensedInput {
-    /// Input before the first frame: no sensor data, no feedback.
-    pub const NONE: Self = Self {
-        frame: 0,
-        time_s: 0.0,
-        measured: Measurements::of_imu(ImuSample::NONE),
-        gimbal_rad: [0.0; 2],
-        fins_rad: [0.0; 4],
-        contact: false,
-        igniter_continuity: false,
-        booster_attached: false,
-        pin_out: false,
-        battery_v: None,
-        log: LogState::NONE,
-        uplink: Uplink::NeverReceived,
-        commander: None,
-        people: None,
-    };
-
     /// The same input with frame and time counted from a release.
     #[must_use]
     pub fn since(&self, release_frame: u64) -> Self {

@@ -139,21 +139,13 @@ impl PadWatch {
         let bias_rad_s =
             self.at_rest().map_or_else(Vector3::zeros, |start| start.calibration.gyro_bias_rad_s);
         let rotation_rad_s = (measured_rad_s - bias_rad_s).norm();
-        if hangs {
-            return Stance {
-                tilt_rad: found.lean_rad,
-                rotation_rad_s,
-                speed_m_s: found.velocity_m_s.norm(),
-                settled: true,
-                hanging_m: Some(found.pressure_altitude_m),
-            };
-        }
+        let standing_rad = || found.at_rest.map_or(f64::NAN, |_| self.estimate().tilt_rad());
         Stance {
-            tilt_rad: found.at_rest.map_or(f64::NAN, |_| self.estimate().tilt_rad()),
+            tilt_rad: if hangs { found.lean_rad } else { standing_rad() },
             rotation_rad_s,
             speed_m_s: found.velocity_m_s.norm(),
-            settled: found.at_rest.is_some(),
-            hanging_m: None,
+            settled: hangs || found.at_rest.is_some(),
+            hanging_m: hangs.then_some(found.pressure_altitude_m),
         }
     }
 
@@ -280,7 +272,7 @@ impl Computer {
         let input = ArmingInput {
             pin_out: locks.pin_out,
             abort_latched: locks.abort_latched,
-            pad_wait_s: self.table.mode().pad_wait_remaining_s(self.table.time_s()),
+            pad_wait_s: self.table.mode().pad_wait_remaining_s(self.table.time_s),
             tilt_rad: stance.tilt_rad,
             rotation_rad_s: stance.rotation_rad_s,
             speed_m_s: stance.speed_m_s,
@@ -312,7 +304,7 @@ impl Computer {
             Phase::PadArmed => true,
             _ => return,
         };
-        let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s()) else { return };
+        let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s) else { return };
         let held = armed && self.hold(HoldCause::CheckFailed, || why.clone());
         if untold && !held {
             let (severity, state) =
@@ -407,7 +399,7 @@ impl Computer {
     }
 
     pub(super) fn countdown_is_over(&self) -> bool {
-        self.table.mode().countdown_remaining_s(self.table.time_s()).is_some_and(|left_s| left_s <= 0.0)
+        self.table.mode().countdown_remaining_s(self.table.time_s).is_some_and(|left_s| left_s <= 0.0)
     }
 
     /// The countdown has ended: the flight begins where the simulation releases the vehicle.
@@ -423,7 +415,7 @@ impl Computer {
 
     /// A vehicle from a rail takes its attitude and gyro bias from there.
     fn begin_flight(&mut self) {
-        self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s() });
+        self.release = Some(Release { frame: self.input.frame, time_s: self.table.time_s });
         // A flight simulated from apogee starts with a step in pressure.
         self.pressure = SpikeFilter::default();
         let mission = self.pilot.mission();

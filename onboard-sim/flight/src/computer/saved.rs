@@ -126,7 +126,7 @@ impl Computer {
             pilot: self.pilot.saved(),
         });
         let latch = self.table.latch();
-        Saved { frame: self.input.frame, time_s: self.table.time_s(), mode, latch, in_the_air }
+        Saved { frame: self.input.frame, time_s: self.table.time_s, mode, latch, in_the_air }
     }
 
     /// Resumes a computer that has just powered up after a reset. `time_s` is the vehicle time at
@@ -203,7 +203,7 @@ impl Computer {
             pad: PadWatch::default(),
             pilot: Box::new(Pilot::starting(mission, 0.0, initial_state, &uncertainty)),
             initial_state: *initial_state,
-            input: SensedInput::NONE,
+            input: SensedInput::default(),
             reported_gate_check: None,
             arming,
             countdown_s: mission.start.countdown_s,
@@ -248,7 +248,7 @@ impl Computer {
     #[must_use]
     pub fn released(mut self, frame: u64) -> Self {
         self.input.frame = frame;
-        self.table.begin(flight_time_s(frame));
+        self.table.time_s = flight_time_s(frame);
         for event in [
             Event::SelfTestPassed,
             Event::PinPulled,
@@ -260,7 +260,7 @@ impl Computer {
         }
         self.release();
         self.table.take_messages();
-        self.motor_watch.update(self.table.mode(), self.table.time_s());
+        self.motor_watch.update(self.table.mode(), self.table.time_s);
         self.input.log = LogState { running: true, space_bytes: u64::MAX };
         self
     }

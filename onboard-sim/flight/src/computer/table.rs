@@ -21,7 +21,7 @@ pub struct PhaseTable {
     latch: Option<Latch>,
     /// Vehicle time of this frame, s.
     #[serde(skip)]
-    time_s: f64,
+    pub(super) time_s: f64,
     #[serde(skip)]
     messages: Vec<CrewMessage>,
 }
@@ -37,11 +37,6 @@ impl PhaseTable {
         (self.mode, self.latch) = (mode, latch);
     }
 
-    /// Begins a frame.
-    pub(super) fn begin(&mut self, time_s: f64) {
-        self.time_s = time_s;
-    }
-
     /// Phase, latches, countdown and motor.
     pub fn mode(&self) -> &Mode {
         &self.mode
@@ -50,11 +45,6 @@ impl PhaseTable {
     /// Why the landing motor is permanently inhibited.
     pub fn latch(&self) -> Option<Latch> {
         self.latch
-    }
-
-    /// Vehicle time of this frame, s.
-    pub(super) fn time_s(&self) -> f64 {
-        self.time_s
     }
 
     /// Applies an event and reports its effects to the crew. The caller carries the effects out.
@@ -156,7 +146,7 @@ impl Computer {
     /// text beside the abort key cannot differ from the effect.
     pub fn abort_effect(&self) -> AbortEffect {
         let mode = self.table.mode();
-        let next = transition(mode, self.abort_event(), self.table.time_s());
+        let next = transition(mode, self.abort_event(), self.table.time_s);
         let does = |effect| next.effects.contains(effect);
         // Rounded up to be conservative; 254 is the largest reported value, 255 would mean
         // "unknown".

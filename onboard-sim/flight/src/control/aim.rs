@@ -164,12 +164,9 @@ impl AimLoop {
         let sensed_rad_s2 = if self.latency_frames == 0 { [0.0; 2] } else { self.under_way_rad_s2[0] };
         self.observe(rate, sensed_rad_s2);
 
-        let error = turn_to_aim_rad(world_from_body, &aim.nose_in_world);
-        let wanted_rate = world_from_body.inverse_transform_vector(&aim.rate_in_world_rad_s);
-        let feed_forward = world_from_body.inverse_transform_vector(&aim.acceleration_in_world_rad_s2);
-        let error = [error.y, error.z];
-        let wanted_rate = [wanted_rate.y, wanted_rate.z];
-        let feed_forward = [feed_forward.y, feed_forward.z];
+        let error = turn_to_aim_rad(world_from_body, &aim.nose_in_world).yz();
+        let wanted_rate = world_from_body.inverse_transform_vector(&aim.rate_in_world_rad_s).yz();
+        let feed_forward = world_from_body.inverse_transform_vector(&aim.acceleration_in_world_rad_s2).yz();
 
         let frequency = self.gains.natural_frequency_rad_s;
         let mut command = [0.0; 2];

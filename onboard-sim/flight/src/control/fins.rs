@@ -16,7 +16,9 @@
 //! If a command does not fit between the stops, first drag is sacrificed, then roll, then pitch and
 //! yaw together, so that a commanded tilt preserves its direction.
 
-use crate::vehicle::fins::{FinModel, Moments, PITCH, ROLL, YAW};
+use nalgebra::Vector3;
+
+use crate::vehicle::fins::{FinModel, PITCH, ROLL, YAW};
 
 /// Rounds that correct the amplitudes. The gains are quadratic in the openings; each round leaves
 /// about a tenth of the error.
@@ -36,19 +38,10 @@ const LEAST_PRESSURE_PA: f64 = 1e-6;
 /// Commanded moments and drag of the fins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FinCommand {
-    /// Moments about the centre of gravity, N m.
-    pub moments: Moments,
+    /// Moments about the body axes, at the centre of gravity, N m.
+    pub moments_n_m: Vector3<f64>,
     /// Drag area of the four fins together, m^2.
     pub drag_area_m2: f64,
-}
-
-/// The openings that may be used.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OpeningRange {
-    /// Smallest, rad.
-    pub min_rad: f64,
-    /// Largest, rad; at most pi/2.
-    pub max_rad: f64,
 }
 
 /// Allocation of commanded moments and drag to the four fins.
@@ -58,8 +51,10 @@ pub struct Allocation {
     pub model: FinModel,
     /// Distance from the centre of gravity forward to the fins, m.
     pub arm_m: f64,
-    /// The openings that may be used.
-    pub range: OpeningRange,
+    /// Smallest opening that may be used, rad.
+    pub min_rad: f64,
+    /// Largest opening that may be used, rad; at most pi/2.
+    pub max_rad: f64,
 }
 
 /// Sines of the openings as a mean and the amplitudes of the patterns.
@@ -125,14 +120,8 @@ fn extremes(values: &[f64; 4]) -> (f64, f64) {
 
 impl Allocation {
     /// Moments about the centre of gravity in a tail-first flow along the axis, N m.
-    pub fn moments(&self, dynamic_pressure_pa: f64, kappa_rad: [f64; 4]) -> Moments {
-        let areas = self.moment_areas(&kappa_rad.map(libm::sin));
-        let scale = dynamic_pressure_pa;
-        Moments {
-            roll_n_m: scale * areas.roll_n_m,
-            pitch_n_m: scale * areas.pitch_n_m,
-            yaw_n_m: scale * areas.yaw_n_m,
-        }
+    pub fn moments_n_m(&self, dynamic_pressure_pa: f64, kappa_rad: [f64; 4]) -> Vector3<f64> {
+        self.moment_areas(&kappa_rad.map(libm::sin)) * dynamic_pressure_pa
     }
 
     /// Drag area of the four fins together, m^2.
@@ -149,50 +138,41 @@ impl Allocation {
     }
 
     /// Moments over dynamic pressure, m^3.
-    fn moment_areas(&self, sines: &[f64; 4]) -> Moments {
+    fn moment_areas(&self, sines: &[f64; 4]) -> Vector3<f64> {
         let (drag_m2, lift_m2) = (self.fin_drag_area_m2(), self.fin_lift_area_m2());
         let (sin, cos) = self.model.from_y;
-        let mut sum = Moments::default();
+        let mut sum = Vector3::zeros();
         for i in 0..4 {
             let s = sines[i];
             let g_m = self.model.radius_m(s) * s;
-            sum.roll_n_m += ROLL[i] * lift_m2 * g_m;
-            sum.pitch_n_m += PITCH[i] * (drag_m2 * sin * g_m - self.arm_m * lift_m2 * cos * s);
-            sum.yaw_n_m += YAW[i] * (drag_m2 * cos * g_m + self.arm_m * lift_m2 * sin * s);
+            sum.x += ROLL[i] * lift_m2 * g_m;
+            sum.y += PITCH[i] * (drag_m2 * sin * g_m - self.arm_m * lift_m2 * cos * s);
+            sum.z += YAW[i] * (drag_m2 * cos * g_m + self.arm_m * lift_m2 * sin * s);
         }
         sum
     }
 
     /// Moment over dynamic pressure for each unit of a pattern's amplitude at a mean opening, m^3.
-    fn slopes(&self, mean: f64) -> Moments {
+    fn slopes(&self, mean: f64) -> Vector3<f64> {
         let (sin, cos) = self.model.from_y;
         let at = |s: f64| {
             let (drag_m2, lift_m2) = (self.fin_drag_area_m2(), self.fin_lift_area_m2());
             let g_slope_m = 0.5 * self.model.body_diameter_m + self.model.length_m * s;
-            Moments {
-                roll_n_m: 4.0 * lift_m2 * g_slope_m,
-                pitch_n_m: 4.0 * (drag_m2 * sin * g_slope_m - self.arm_m * lift_m2 * cos),
-                yaw_n_m: 4.0 * (drag_m2 * cos * g_slope_m + self.arm_m * lift_m2 * sin),
-            }
+            Vector3::new(
+                4.0 * lift_m2 * g_slope_m,
+                4.0 * (drag_m2 * sin * g_slope_m - self.arm_m * lift_m2 * cos),
+                4.0 * (drag_m2 * cos * g_slope_m + self.arm_m * lift_m2 * sin),
+            )
         };
-        let (here, half) = (at(mean), at(0.5));
-        Moments {
-            roll_n_m: floored(here.roll_n_m, half.roll_n_m),
-            pitch_n_m: floored(here.pitch_n_m, half.pitch_n_m),
-            yaw_n_m: floored(here.yaw_n_m, half.yaw_n_m),
-        }
+        at(mean).zip_map(&at(0.5), floored)
     }
 
     /// The four opening angles for a command, rad, always inside the range. Without air, or with a
     /// command that is not finite, the fins open fully, as in the passive descent.
     pub fn openings_rad(&self, command: &FinCommand, dynamic_pressure_pa: f64) -> [f64; 4] {
-        let OpeningRange { min_rad, max_rad } = self.range;
+        let Self { min_rad, max_rad, .. } = *self;
         let (lowest, highest) = (libm::sin(min_rad), libm::sin(max_rad));
-        let wanted = [
-            command.moments.roll_n_m / dynamic_pressure_pa,
-            command.moments.pitch_n_m / dynamic_pressure_pa,
-            command.moments.yaw_n_m / dynamic_pressure_pa,
-        ];
+        let wanted = command.moments_n_m / dynamic_pressure_pa;
         let mean = command.drag_area_m2 / (4.0 * self.fin_drag_area_m2());
         if !(mean.is_finite()
             && wanted.iter().all(|value| value.is_finite())
@@ -202,13 +182,13 @@ impl Allocation {
         }
         let mut patterns = Patterns { mean, ..Patterns::default() }.fit(lowest, highest);
         for _ in 0..ROUNDS {
-            let found = self.moment_areas(&patterns.sines());
-            let slopes = self.slopes(patterns.mean);
+            let missing = wanted - self.moment_areas(&patterns.sines());
+            let more = missing.component_div(&self.slopes(patterns.mean));
             patterns = Patterns {
                 mean,
-                roll: patterns.roll + (wanted[0] - found.roll_n_m) / slopes.roll_n_m,
-                pitch: patterns.pitch + (wanted[1] - found.pitch_n_m) / slopes.pitch_n_m,
-                yaw: patterns.yaw + (wanted[2] - found.yaw_n_m) / slopes.yaw_n_m,
+                roll: patterns.roll + more.x,
+                pitch: patterns.pitch + more.y,
+                yaw: patterns.yaw + more.z,
             }
             .fit(lowest, highest);
         }

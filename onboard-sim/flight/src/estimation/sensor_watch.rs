@@ -100,6 +100,16 @@ impl<const N: usize> Channel<N> {
     fn repeats_for_s(&self, frozen: u32, time_s: f64) -> Option<f64> {
         (self.same >= frozen).then_some(time_s - self.same_since_s)
     }
+
+    /// The channel's loss as text: it is silent for too long, or has repeated one value for
+    /// `frozen` samples.
+    fn lost(&self, name: &str, time_s: f64, longest_s: f64, frozen: u32) -> Option<String> {
+        let silent_s = self.silent_s(time_s);
+        let repeats = || self.repeats_for_s(frozen, time_s);
+        (silent_s > longest_s)
+            .then(|| format!("{name} silent for {silent_s:.1} s"))
+            .or_else(|| repeats().map(|for_s| format!("{name} repeats one value for {for_s:.1} s")))
+    }
 }
 
 /// The monitor of all sensors.
@@ -216,14 +226,14 @@ impl SensorWatch {
     /// Time without inertial data, s: accelerometer or gyro repeat one sample, or report
     /// implausible values.
     pub fn no_inertial_data_for_s(&self) -> f64 {
-        let gyro_s = self.gyro.repeats_for_s(FROZEN_IMU, self.time_s).unwrap_or(0.0);
-        self.accelerometer_lost_s().max(gyro_s).max(self.gyro.silent_s(self.time_s))
+        let [_, [silent_s, repeats_s], ..] = self.lost_s();
+        self.accelerometer_lost_s().max(repeats_s).max(silent_s)
     }
 
     /// Time for which the accelerometer has repeated one sample, or sent none, s.
     pub fn accelerometer_lost_s(&self) -> f64 {
-        let frozen_s = self.accelerometer_frozen_s().unwrap_or(0.0);
-        frozen_s.max(self.accelerometer.silent_s(self.time_s))
+        let [[silent_s, repeats_s], ..] = self.lost_s();
+        repeats_s.max(silent_s)
     }
 
     /// Recent mean of the gyro, body, rad/s.
@@ -234,32 +244,23 @@ impl SensorWatch {
     /// The defect of each of the [`SENSORS`] of a vehicle at rest, as text for the crew.
     pub fn defects(&self, rests: Rests) -> [Option<String>; SENSORS.len()] {
         let time_s = self.time_s;
-        let silent = |name: &str, silent_s: f64, longest_s: f64| {
-            (silent_s > longest_s).then(|| format!("{name} silent for {silent_s:.1} s"))
-        };
-        let repeats = |name: &str, for_s: Option<f64>| {
-            for_s.map(|for_s| format!("{name} repeats one value for {for_s:.1} s"))
-        };
         let sensed_m_s2 = self.sensed_m_s2.norm();
-        let accelerometer = silent("accelerometer", self.accelerometer.silent_s(time_s), IMU_LOST_S)
-            .or_else(|| repeats("accelerometer", self.accelerometer_frozen_s()))
-            .or_else(|| {
+        let accelerometer =
+            self.accelerometer.lost("accelerometer", time_s, IMU_LOST_S, FROZEN_IMU).or_else(|| {
                 let wrong = !AT_REST_M_S2.contains(&sensed_m_s2) && rests != Rests::Hanging;
                 wrong.then(|| format!("accelerometer reads {sensed_m_s2:.1} m/s2 at rest, not 9.8"))
             });
-        let gyro = silent("gyro", self.gyro.silent_s(time_s), IMU_LOST_S)
-            .or_else(|| repeats("gyro", self.gyro.repeats_for_s(FROZEN_IMU, time_s)));
+        let gyro = self.gyro.lost("gyro", time_s, IMU_LOST_S, FROZEN_IMU);
         let place_m = match rests {
             Rests::Standing { at_m, .. } => Some(at_m),
             Rests::Hanging => None,
         };
-        let barometer = silent("barometer", self.barometer.silent_s(time_s), BAROMETER_LOST_S)
-            .or_else(|| repeats("barometer", self.barometer.repeats_for_s(FROZEN_BAROMETER, time_s)))
-            .or_else(|| {
-                let off_m = self.barometer.last[0] - place_m?.z;
-                (off_m.abs() > BAROMETER_OFF_M)
-                    .then(|| format!("barometer {off_m:.0} m off: power cycle to zero it"))
-            });
+        let barometer = self.barometer.lost("barometer", time_s, BAROMETER_LOST_S, FROZEN_BAROMETER);
+        let barometer = barometer.or_else(|| {
+            let off_m = self.barometer.last[0] - place_m?.z;
+            (off_m.abs() > BAROMETER_OFF_M)
+                .then(|| format!("barometer {off_m:.0} m off: power cycle to zero it"))
+        });
         let gnss_silent_s = self.gnss.silent_s(time_s);
         let gnss = (gnss_silent_s > GNSS_LOST_S)
             .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
@@ -269,13 +270,11 @@ impl SensorWatch {
             });
         let lidar = match rests {
             Rests::Standing { range_m, .. } if range_m >= LIDAR_BLIND_M => {
-                silent("lidar", self.lidar.silent_s(time_s), LIDAR_LOST_S)
-                    .or_else(|| repeats("lidar", self.lidar.repeats_for_s(FROZEN_RANGES, time_s)))
-                    .or_else(|| {
-                        let off = self.ranges_m.iter().all(|found_m| (found_m - range_m).abs() > LIDAR_OFF_M);
-                        let found_m = self.ranges_m[0];
-                        off.then(|| format!("lidar {found_m:.2} m at rest, not {range_m:.2}"))
-                    })
+                self.lidar.lost("lidar", time_s, LIDAR_LOST_S, FROZEN_RANGES).or_else(|| {
+                    let off = self.ranges_m.iter().all(|found_m| (found_m - range_m).abs() > LIDAR_OFF_M);
+                    let found_m = self.ranges_m[0];
+                    off.then(|| format!("lidar {found_m:.2} m at rest, not {range_m:.2}"))
+                })
             }
             Rests::Standing { .. } | Rests::Hanging => None,
         };

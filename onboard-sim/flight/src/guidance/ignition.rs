@@ -28,7 +28,6 @@ pub struct IgnitionSettings {
     pub place: f64,
     /// Largest delay of an igniter beyond the expected one, s. None ignites much earlier, so the
     /// height is chosen for the middle of the two.
-    #[serde(default)]
     pub late_s: f64,
     /// Expected time from command to thrust, s; half of the rise of the thrust counts.
     pub delay_s: f64,
@@ -44,10 +43,8 @@ pub struct IgnitionPrediction {
     /// Heights from which the certified motor lands if its thrust begins there at the expected
     /// speed, m.
     pub band: Option<Band>,
-    /// Heights from which all considered motors land, m.
-    pub common: Option<Band>,
-    /// From the highest of their low ends to the lowest of their high ends, m; the latter may lie
-    /// below the former.
+    /// From the highest low end to the lowest high end of all considered motors, m; the latter may
+    /// lie below the former.
     pub nearest: Option<Band>,
     /// The chosen height at which thrust should begin, m.
     pub chosen_m: Option<f64>,
@@ -119,8 +116,6 @@ impl IgnitionSettings {
         let [short, long] = self.burn_time_scales;
         let extremes = [(weak, 1.0), (strong, 1.0), (1.0, short), (1.0, long)];
         let bands = extremes.map(|(impulse, time)| band(impulse, time));
-        let common = certified
-            .and_then(|certified| bands.iter().try_fold(certified, |common, band| common.and(&(*band)?)));
         // If no height suits all motors, the middle between the highest low end and the lowest high
         // end is closest to all of them.
         let nearest = certified.map(|certified| {
@@ -140,7 +135,6 @@ impl IgnitionSettings {
             chosen_m.map(|chosen_m| (onset_height_m - chosen_m) / (-onset_vertical_m_s).max(1.0));
         IgnitionPrediction {
             band: certified,
-            common,
             nearest,
             chosen_m,
             onset_height_m,

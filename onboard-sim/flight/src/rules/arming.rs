@@ -13,11 +13,12 @@ use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::mission::ArmingLimits;
 
 /// The radio link to the station that requests arming.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Uplink {
     /// The vehicle starts by itself: there is no station.
     NotNeeded,
     /// No heartbeat of the station was ever accepted.
+    #[default]
     NeverReceived,
     /// Time since its last accepted heartbeat.
     Received { age_s: f64 },

@@ -85,6 +85,7 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
         shut: !holds,
         lasts: !holds && lasts,
     };
+    let (rate_deg_s, apart_m) = (input.pitch_rate_rad_s.to_degrees(), input.height_disagreement_m);
     let speed_error = (input.speed_m_s - input.predicted_speed_m_s) / input.predicted_speed_m_s;
     [
         condition("sensors contradict the estimate", input.sensors_agree, true),
@@ -95,21 +96,9 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
         value("touchdown beyond the fence", input.predicted_touchdown_x_m, limits.fence_radius_m, "m", 1.0),
         condition("no landing ahead", input.lands_ahead, true),
         value("tilt", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg", FAR_BEYOND),
-        value(
-            "pitch rate",
-            input.pitch_rate_rad_s.to_degrees(),
-            limits.pitch_rate_max_deg_s,
-            "deg/s",
-            FAR_BEYOND,
-        ),
+        value("pitch rate", rate_deg_s, limits.pitch_rate_max_deg_s, "deg/s", FAR_BEYOND),
         value("speed error", 100.0 * speed_error, 100.0 * limits.speed_error_max_fraction, "%", FAR_BEYOND),
-        value(
-            "heights disagree",
-            input.height_disagreement_m,
-            limits.height_disagreement_max_m,
-            "m",
-            FAR_BEYOND,
-        ),
+        value("heights disagree", apart_m, limits.height_disagreement_max_m, "m", FAR_BEYOND),
         condition("no landing plan", input.landing_feasible, false),
         condition("not descending", input.vertical_speed_m_s < 0.0, false),
         condition("parachute not stowed", input.parachute_stowed, false),

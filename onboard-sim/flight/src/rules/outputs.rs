@@ -46,43 +46,28 @@ pub fn why_not(
     progress: FlightProgress,
 ) -> impl Iterator<Item = &'static str> {
     let Mode { phase, interlocks: locks, motor, .. } = *mode;
-    let reasons: [Option<&'static str>; 6] = match output {
-        PyroOutput::AscentIgniter => [
-            (phase != Phase::Boost).then_some("only BOOST lights the ascent motor"),
-            (!progress.flying).then_some("the flight begins with the next frame"),
-            progress.lifted_off.then_some("the vehicle has lifted off"),
-            (!locks.armed).then_some("not armed"),
-            (!locks.pin_out).then_some("the pin is in"),
-            locks.abort_latched.then_some("an abort is latched"),
-        ],
-        PyroOutput::LandingIgniter => [
-            (phase != Phase::Ignition).then_some("only IGNITION lights the landing motor"),
-            locks.landing_motor_inhibited.then_some("the landing motor is inhibited"),
-            (!locks.armed).then_some("not armed"),
-            (!locks.pin_out).then_some("the pin is in"),
-            // An abort too low for the parachute lands on the motor, as does one after the ignition
-            // command.
-            (locks.abort_latched && !locks.lands_in_place).then_some("an abort is latched"),
-            None,
-        ],
-        PyroOutput::Separation => [
-            (!progress.separation_due).then_some("apogee is not near"),
-            phase.on_pad().then_some("the vehicle is on its pad"),
-            None,
-            None,
-            None,
-            None,
-        ],
-        PyroOutput::Parachute => [
-            (phase != Phase::Chute).then_some("only CHUTE ejects the parachute"),
-            (motor == Motor::Burning).then_some("the landing motor burns"),
-            (!progress.hatch_free).then_some("the fins are still over its hatch"),
-            None,
-            None,
-            None,
-        ],
-    };
-    reasons.into_iter().flatten()
+    let reasons = [
+        (PyroOutput::AscentIgniter, phase != Phase::Boost, "only BOOST lights the ascent motor"),
+        (PyroOutput::AscentIgniter, !progress.flying, "the flight begins with the next frame"),
+        (PyroOutput::AscentIgniter, progress.lifted_off, "the vehicle has lifted off"),
+        (PyroOutput::AscentIgniter, !locks.armed, "not armed"),
+        (PyroOutput::AscentIgniter, !locks.pin_out, "the pin is in"),
+        (PyroOutput::AscentIgniter, locks.abort_latched, "an abort is latched"),
+        (PyroOutput::LandingIgniter, phase != Phase::Ignition, "only IGNITION lights the landing motor"),
+        (PyroOutput::LandingIgniter, locks.landing_motor_inhibited, "the landing motor is inhibited"),
+        (PyroOutput::LandingIgniter, !locks.armed, "not armed"),
+        (PyroOutput::LandingIgniter, !locks.pin_out, "the pin is in"),
+        // An abort too low for the parachute lands on the motor, as does one after the ignition
+        // command.
+        (PyroOutput::LandingIgniter, locks.abort_latched && !locks.lands_in_place, "an abort is latched"),
+        (PyroOutput::Separation, !progress.separation_due, "apogee is not near"),
+        (PyroOutput::Separation, phase.on_pad(), "the vehicle is on its pad"),
+        (PyroOutput::Parachute, phase != Phase::Chute, "only CHUTE ejects the parachute"),
+        (PyroOutput::Parachute, motor == Motor::Burning, "the landing motor burns"),
+        (PyroOutput::Parachute, !progress.hatch_free, "the fins are still over its hatch"),
+    ];
+    let applies = move |(of, holds, words)| (of == output && holds).then_some(words);
+    reasons.into_iter().filter_map(applies)
 }
 
 /// The energised outputs. Nothing else in the flight computer can set one: the field is private.

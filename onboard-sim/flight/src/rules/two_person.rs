@@ -148,9 +148,10 @@ pub struct TwoPerson {
     /// Number of proposals so far.
     proposals: u16,
     proposal: Option<Proposal>,
-    /// The agreed proposal that armed the vehicle.
-    armed: Option<Proposal>,
-    tapping: Option<Tapping>,
+    /// The agreed proposal that armed the vehicle: its operator is in command.
+    pub armed: Option<Proposal>,
+    /// The operator whose taps keep the countdown running.
+    pub tapping: Option<Tapping>,
 }
 
 impl TwoPerson {
@@ -173,7 +174,13 @@ impl TwoPerson {
                 Some(other) if other.by.number != by.number => Reply::Refused(NoAgreement::Pending(other)),
                 // A repeated proposal does not extend the time limit.
                 Some(proposal) if proposal.act == act => Reply::Proposed(proposal),
-                _ => self.propose(act, (by, station), first, time_s),
+                _ => {
+                    let number = proposal_number(first, self.proposals);
+                    let proposal = Proposal { act, number, by, station, at_s: time_s };
+                    self.proposals = self.proposals.wrapping_add(1);
+                    self.proposal = Some(proposal);
+                    Reply::Proposed(proposal)
+                }
             };
         };
         let Some(proposal) = waiting.filter(|one| one.act == act && one.number == number) else {
@@ -189,14 +196,6 @@ impl TwoPerson {
         Reply::Agreed { proposal, confirmed_by: by }
     }
 
-    fn propose(&mut self, act: Act, (by, station): (Operator, Station), first: u16, time_s: f64) -> Reply {
-        let number = proposal_number(first, self.proposals);
-        let proposal = Proposal { act, number, by, station, at_s: time_s };
-        self.proposals = self.proposals.wrapping_add(1);
-        self.proposal = Some(proposal);
-        Reply::Proposed(proposal)
-    }
-
     /// The proposal waiting for its confirmation.
     pub fn waiting(&self, time_s: f64) -> Option<Proposal> {
         self.proposal.filter(|proposal| proposal.waits(time_s))
@@ -205,16 +204,6 @@ impl TwoPerson {
     /// Withdraws the proposal after an abort, a disarm or a hold.
     pub fn withdraw(&mut self) {
         self.proposal = None;
-    }
-
-    /// Records that the agreed proposal has armed the vehicle.
-    pub fn armed(&mut self, proposal: Proposal) {
-        self.armed = Some(proposal);
-    }
-
-    /// The proposal that armed the vehicle: its operator is in command.
-    pub fn armed_by(&self) -> Option<Proposal> {
-        self.armed
     }
 
     /// Begins the countdown's taps by this operator, who is not in command.
@@ -234,11 +223,6 @@ impl TwoPerson {
     /// Ends the taps: the countdown has ended or is held.
     pub fn end_taps(&mut self) {
         self.tapping = None;
-    }
-
-    /// The operator whose taps keep the countdown running.
-    pub fn tapping(&self) -> Option<Tapping> {
-        self.tapping
     }
 
     /// The operator whose taps are overdue.

@@ -58,21 +58,7 @@ impl Touchdown {
 }
 
 /// The largest values of a [`Touchdown`]; infinite: not limited. Nothing is below the ground.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Distance from the target, m.
-    pub distance_m: f64,
-    /// Height of the feet, m.
-    pub height_m: f64,
-    /// Speed up or down, m/s.
-    pub vertical_m_s: f64,
-    /// Lateral speed, m/s.
-    pub lateral_m_s: f64,
-    /// Tilt, rad.
-    pub tilt_rad: f64,
-    /// Rotation rate, rad/s.
-    pub rate_rad_s: f64,
-}
+pub type Limits = Touchdown;
 
 /// Table 2 of the landing paper, for a [`Touchdown::along_axis`]: x, altitude, u, w, pitch error,
 /// pitch rate.

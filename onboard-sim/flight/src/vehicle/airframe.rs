@@ -4,7 +4,8 @@
 //! The thrust goes through the gimbal's pivot. The controller's model and the simulated truth use
 //! the same data.
 
-use alloc::string::String;
+use alloc::borrow::ToOwned as _;
+use alloc::string::{String, ToString};
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -18,7 +19,6 @@ pub struct Airframe {
     /// Name of a built-in landing motor, or the text of its `.eng` or `.rse` file.
     pub motor: String,
     /// How many independent igniters light the landing motor, 1 to 3.
-    #[serde(default = "one")]
     pub igniters: u32,
     /// The servos report where they are. If not, people must have seen them move before the vehicle
     /// is armed.
@@ -35,13 +35,21 @@ pub struct Airframe {
     pub parachute: Parachute,
 }
 
-/// A value of an airframe is outside its range.
+/// A value is outside its range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{key} is {found}; {required} is accepted")]
 pub struct BadValue {
-    pub key: &'static str,
-    pub found: f64,
+    /// The key, with its section.
+    pub key: String,
+    pub found: String,
+    /// The accepted range, in words.
     pub required: &'static str,
+}
+
+impl BadValue {
+    pub(crate) fn new(key: &str, found: &dyn ToString, required: &'static str) -> Self {
+        Self { key: key.to_owned(), found: found.to_string(), required }
+    }
 }
 
 impl Airframe {
@@ -221,10 +229,6 @@ impl MassModel {
     }
 }
 
-fn one() -> u32 {
-    1
-}
-
 // The sections of an airframe, one struct each, with their accessors in SI and radians.
 
 /// Masses with the landing motor full, and the place of the propellant.
@@ -379,10 +383,8 @@ pub struct Legs {
     /// Friction coefficient between foot and ground.
     pub friction_coefficient: f64,
     /// Drag area of the four together when they stand out, m^2.
-    #[serde(default)]
     pub drag_area_m2: f64,
     /// Station at which it acts, m above the nozzle.
-    #[serde(default)]
     pub drag_station_m: f64,
     /// The crushable element of each leg; without it the spring takes any load without a stop.
     pub crush: Option<Crush>,
@@ -513,7 +515,7 @@ fn validate(airframe: &Airframe) -> Result<(), BadValue> {
         ]
     });
     match rows.into_iter().chain(crush).find(|(_, _, ok, _)| !ok) {
-        Some((key, found, _, required)) => Err(BadValue { key, found, required }),
+        Some((key, found, _, required)) => Err(BadValue::new(key, &found, required)),
         None => Ok(()),
     }
 }
@@ -577,7 +579,8 @@ mod tests {
         ] {
             let mut airframe = mk3.clone();
             airframe.fins = FinData { width_m, from_y_deg, hinge_off_deg, ..airframe.fins };
-            assert_eq!(airframe.validate().err().map(|bad| bad.key), wrong, "{width_m} {from_y_deg}");
+            let found = airframe.validate().err().map(|bad| bad.key);
+            assert_eq!(found.as_deref(), wrong, "{width_m} {from_y_deg}");
         }
     }
 

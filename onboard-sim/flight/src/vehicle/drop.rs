@@ -22,25 +22,7 @@ pub struct Drop {
     pub release_after_s: f64,
     /// Arming limits of a hanging vehicle, as means over a second: tilt, degrees, rotation rate,
     /// degrees per second, and speed, m/s. On a pad it must be at rest.
-    #[serde(default = "tilt_max_deg")]
     pub tilt_max_deg: f64,
-    #[serde(default = "rotation_max_deg_s")]
     pub rotation_max_deg_s: f64,
-    #[serde(default = "speed_max_m_s")]
     pub speed_max_m_s: f64,
-}
-
-/// Half of the ignition gate's limit.
-fn tilt_max_deg() -> f64 {
-    10.0
-}
-
-/// A swing of 8 degrees on 2.3 m of rope and vehicle turns at 17 degrees per second.
-fn rotation_max_deg_s() -> f64 {
-    30.0
-}
-
-/// A drone that drifts at 2 m/s, and the swing's 0.7 m/s.
-fn speed_max_m_s() -> f64 {
-    3.0
 }

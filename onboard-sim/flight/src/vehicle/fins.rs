@@ -55,17 +55,6 @@ pub struct FinModel {
     pub from_y: (f64, f64),
 }
 
-/// Moments about the body axes, N m.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Moments {
-    /// About x.
-    pub roll_n_m: f64,
-    /// About y.
-    pub pitch_n_m: f64,
-    /// About z.
-    pub yaw_n_m: f64,
-}
-
 /// Sine and cosine of an angle in degrees; those of the paper's 30 degrees exactly, of which no
 /// `f64` in radians has the sine.
 pub fn sin_cos_deg(angle_deg: f64) -> (f64, f64) {
@@ -94,7 +83,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+    use crate::control::fins::{Allocation, FinCommand};
 
     /// Sine and cosine of the paper's 30 degrees.
     const PLACE: (f64, f64) = (0.5, 0.866_025_403_784_438_6);
@@ -112,8 +101,7 @@ mod tests {
     }
 
     fn allocation() -> Allocation {
-        let range = OpeningRange { min_rad: 20.0_f64.to_radians(), max_rad: FRAC_PI_2 };
-        Allocation { model: model(), arm_m: 0.23, range }
+        Allocation { model: model(), arm_m: 0.23, min_rad: 20.0_f64.to_radians(), max_rad: FRAC_PI_2 }
     }
 
     fn close(found: f64, expected: f64, what: &str) {
@@ -131,10 +119,10 @@ mod tests {
         for i in 0..4 {
             let mut kappa_rad = [0.0; 4];
             kappa_rad[i] = FRAC_PI_2;
-            let moments = Allocation { arm_m: 0.0, ..allocation() }.moments(1000.0, kappa_rad);
-            close(moments.roll_n_m, ROLL[i] * 0.478_848, "roll");
-            close(moments.pitch_n_m, PITCH[i] * 0.289_927_5, "pitch");
-            close(moments.yaw_n_m, YAW[i] * 0.502_169_160_532, "yaw");
+            let moments = Allocation { arm_m: 0.0, ..allocation() }.moments_n_m(1000.0, kappa_rad);
+            close(moments.x, ROLL[i] * 0.478_848, "roll");
+            close(moments.y, PITCH[i] * 0.289_927_5, "pitch");
+            close(moments.z, YAW[i] * 0.502_169_160_532, "yaw");
         }
     }
 
@@ -144,8 +132,8 @@ mod tests {
     fn patterns_are_decoupled() {
         let at = |amplitude: f64, signs: [f64; 4]| {
             let kappa_rad = signs.map(|sign| libm::asin(0.6 + sign * amplitude));
-            let moments = allocation().moments(800.0, kappa_rad);
-            [moments.roll_n_m, moments.pitch_n_m, moments.yaw_n_m]
+            let moments = allocation().moments_n_m(800.0, kappa_rad);
+            [moments.x, moments.y, moments.z]
         };
         for (signs, axis) in [(ROLL, 0), (PITCH, 1), (YAW, 2)] {
             let found = at(0.2, signs);
@@ -173,16 +161,16 @@ mod tests {
                     + Vector3::x().cross(&outward) * (800.0 * 0.0043 * 1.28 * sine * ROLL[fin]);
                 sum += (Vector3::x() * 0.23 + outward * model.radius_m(sine)).cross(&force_n);
             }
-            let found = allocation.moments(800.0, kappa_rad);
-            close(found.roll_n_m, sum.x, "roll");
-            close(found.pitch_n_m, sum.y, "pitch");
-            close(found.yaw_n_m, sum.z, "yaw");
+            let found = allocation.moments_n_m(800.0, kappa_rad);
+            close(found.x, sum.x, "roll");
+            close(found.y, sum.y, "pitch");
+            close(found.z, sum.z, "yaw");
         }
     }
 
     #[test]
     fn without_air_or_with_a_bad_command_the_fins_open() {
-        let command = FinCommand { moments: Moments::default(), drag_area_m2: 0.01 };
+        let command = FinCommand { moments_n_m: Vector3::zeros(), drag_area_m2: 0.01 };
         let nonsense = FinCommand { drag_area_m2: f64::NAN, ..command };
         for (command, pressure_pa) in
             [(command, 0.0), (command, f64::NAN), (nonsense, 900.0), (command, -3.0)]
@@ -197,8 +185,8 @@ mod tests {
     #[test]
     fn pitch_has_priority_over_roll_and_drag() {
         let allocation = allocation();
-        let moments = Moments { roll_n_m: 50.0, pitch_n_m: 40.0, yaw_n_m: 0.0 };
-        let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2: 0.0 }, 900.0);
+        let moments_n_m = Vector3::new(50.0, 40.0, 0.0);
+        let kappa_rad = allocation.openings_rad(&FinCommand { moments_n_m, drag_area_m2: 0.0 }, 900.0);
         let room = 1.0 - libm::sin(20.0_f64.to_radians());
         for (fin, found_rad) in kappa_rad.into_iter().enumerate() {
             // Here the side force of the lifts pitches more than their drag, and the other way.
@@ -215,15 +203,14 @@ mod tests {
         for wanted_n_m in [1.0, 10.0, 1000.0] {
             for step in 0..36 {
                 let (sin, cos) = libm::sincos(f64::from(step) * core::f64::consts::TAU / 36.0);
-                let moments =
-                    Moments { roll_n_m: 0.0, pitch_n_m: wanted_n_m * cos, yaw_n_m: wanted_n_m * sin };
+                let moments_n_m = Vector3::new(0.0, wanted_n_m * cos, wanted_n_m * sin);
                 for drag_area_m2 in [0.0, 0.015, 1.0] {
-                    let kappa_rad = allocation.openings_rad(&FinCommand { moments, drag_area_m2 }, 900.0);
-                    let Moments { pitch_n_m, yaw_n_m, .. } = allocation.moments(900.0, kappa_rad);
+                    let kappa_rad = allocation.openings_rad(&FinCommand { moments_n_m, drag_area_m2 }, 900.0);
+                    let [_, pitch_n_m, yaw_n_m] = allocation.moments_n_m(900.0, kappa_rad).into();
                     let (along, across) = (cos * pitch_n_m + sin * yaw_n_m, cos * yaw_n_m - sin * pitch_n_m);
                     assert!(
                         along > 0.25 && across.abs() < 0.017 * along,
-                        "{moments:?}: {pitch_n_m}, {yaw_n_m}"
+                        "{moments_n_m}: {pitch_n_m}, {yaw_n_m}"
                     );
                 }
             }
@@ -240,10 +227,10 @@ mod tests {
             drag_area_m2 in proptest::num::f64::ANY,
             dynamic_pressure_pa in proptest::num::f64::ANY,
         ) {
-            let command = FinCommand { moments: Moments { roll_n_m, pitch_n_m, yaw_n_m }, drag_area_m2 };
+            let command = FinCommand { moments_n_m: Vector3::new(roll_n_m, pitch_n_m, yaw_n_m), drag_area_m2 };
             let allocation = allocation();
             for kappa_rad in allocation.openings_rad(&command, dynamic_pressure_pa) {
-                prop_assert!((allocation.range.min_rad..=allocation.range.max_rad).contains(&kappa_rad), "{kappa_rad}");
+                prop_assert!((allocation.min_rad..=allocation.max_rad).contains(&kappa_rad), "{kappa_rad}");
             }
         }
 
@@ -262,7 +249,7 @@ mod tests {
                 libm::asin(mean + roll * ROLL[i] + pitch * PITCH[i] + yaw * YAW[i])
             });
             let command = FinCommand {
-                moments: allocation.moments(dynamic_pressure_pa, kappa_rad),
+                moments_n_m: allocation.moments_n_m(dynamic_pressure_pa, kappa_rad),
                 drag_area_m2: allocation.drag_area_m2(kappa_rad),
             };
             let found_rad = allocation.openings_rad(&command, dynamic_pressure_pa);

@@ -34,10 +34,8 @@ pub struct Rail {
     /// Direction of the tilt in the world, from x towards y, degrees.
     pub towards_deg: f64,
     /// Position of its foot from the middle of the landing pad, to the north, m.
-    #[serde(default)]
     pub x_m: f64,
     /// To the west, m.
-    #[serde(default)]
     pub y_m: f64,
     /// The crew places it upwind of the landing pad by this time times the mean wind at 10 m that
     /// it measures, s, and writes where it stands into `x_m` and `y_m`. A simulated crew does so
@@ -166,7 +164,7 @@ impl Launch {
             ("launch.booster.fin_radius_m", fin_radius_m, (0.001..=1.0, "0.001 to 1")),
         ];
         match rows.into_iter().find(|(_, found, (range, _))| !range.contains(found)) {
-            Some((key, found, (_, required))) => Err(BadValue { key, found, required }),
+            Some((key, found, (_, required))) => Err(BadValue::new(key, &found, required)),
             None => Ok(()),
         }
     }

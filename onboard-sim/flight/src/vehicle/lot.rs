@@ -208,7 +208,7 @@ impl Lot {
             ("lot.weighed.vehicle_kg", vehicle, vehicle_kg, "within a tenth of airframe.mass.loaded_kg, kg"),
         ] {
             if let Some(found) = found.filter(|found| !(0.9..=1.1).contains(&(found / by_data))) {
-                return Err(BadValue { key, found, required });
+                return Err(BadValue::new(key, &found, required));
             }
         }
         Ok(())

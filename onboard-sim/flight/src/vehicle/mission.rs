@@ -54,7 +54,6 @@ pub struct UnknownStart;
 #[serde(deny_unknown_fields)]
 pub struct Start {
     /// Where the flight begins: `pad` needs the section `launch`, `drone` the section `drop`.
-    #[serde(default = "at_apogee")]
     pub at: StartPoint,
     /// Time from the crew's start command to the start, s, 0 to 600.
     pub countdown_s: f64,
@@ -254,10 +253,8 @@ pub struct Mission {
     pub site: Site,
     #[serde(default)]
     pub sensors: SensorPlaces,
-    #[serde(default)]
     pub exhaust: Exhaust,
     /// The prior of the motor before ignition.
-    #[serde(default)]
     pub motor: MotorPrior,
     /// A plan assumes a motor that is weaker than the estimate by this many standard deviations of
     /// the remaining impulse.
@@ -279,7 +276,6 @@ pub struct Mission {
     pub launch: Option<Launch>,
     /// The drone, for a start below it.
     pub drop: Option<Drop>,
-    #[serde(default)]
     pub estimator: EstimatorConfig,
     /// Steering by fins.
     pub descent: DescentGains,
@@ -291,7 +287,6 @@ pub struct Mission {
     pub aim: AimGains,
     /// Whether the gimbal holds a vehicle upright that has touched down while the thrust still
     /// carries it.
-    #[serde(default)]
     pub upright_after_contact: bool,
     /// Limits of the pad checks before arming.
     #[serde(default)]
@@ -339,8 +334,4 @@ impl Mission {
         self.motor.burn_time_sigma = burn_time.share;
         self.expected = Some(Box::new(expected));
     }
-}
-
-fn at_apogee() -> StartPoint {
-    StartPoint::Apogee
 }

@@ -3,7 +3,7 @@
 use alloc::borrow::ToOwned as _;
 use alloc::string::{String, ToString as _};
 
-use super::mission::BadValue;
+use crate::vehicle::airframe::BadValue;
 
 /// Why a mission cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -17,15 +17,11 @@ pub enum FileError {
         message: String,
     },
     /// A key holds a value outside its range.
-    #[error("{origin}: {key} = {found}: must be {required}")]
+    #[error("{origin}: {} = {}: must be {}", bad.key, bad.found, bad.required)]
     Value {
         /// Where the text came from (a path or a built-in's name).
         origin: String,
-        /// The key, with its section.
-        key: String,
-        found: String,
-        /// The accepted range, in words.
-        required: &'static str,
+        bad: BadValue,
     },
 }
 
@@ -35,7 +31,6 @@ impl FileError {
     }
 
     pub(super) fn bad_value(origin: &str, bad: BadValue) -> Self {
-        let BadValue { key, found, required } = bad;
-        Self::Value { origin: origin.to_owned(), key, found, required }
+        Self::Value { origin: origin.to_owned(), bad }
     }
 }

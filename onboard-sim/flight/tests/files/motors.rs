@@ -53,7 +53,8 @@ fn an_airframe_may_contain_the_text_of_its_motor_file() {
     assert!((curve.total_impulse_n_s() - 20.0).abs() < 1e-9, "{}", curve.total_impulse_n_s());
     assert_eq!(named(&rocksim.replace("dia=", "Itot=\"19\" dia=")), named(rocksim));
     let refused = named(&rocksim.replace("dia=", "Itot=\"200\" dia=")).expect_err("ten times the points");
-    assert!(refused.to_string().contains("Itot is '200'; half to twice the impulse"), "{refused}");
+    let source = std::error::Error::source(&refused).expect("the field").to_string();
+    assert!(source.contains("Itot is '200'; half to twice the impulse"), "{source}");
     let refused = named("<engine-database>\n</engine-database>").expect_err("no motor in it");
     assert!(refused.to_string().contains("of the airframe"), "{refused}");
     assert!(named("H4").expect_err("no such motor").to_string().contains("H45W"));

@@ -3,11 +3,10 @@
 
 use std::sync::LazyLock;
 
-use flight::control::fins::{Allocation, FinCommand, OpeningRange};
+use flight::control::fins::{Allocation, FinCommand};
 use flight::estimation::estimator::{Estimate, Estimator, EstimatorConfig, StartUncertainty, VehicleNow};
 use flight::estimation::motor_estimate::{MotorEstimate, MotorPrior, MotorSample, MotorStage};
 use flight::vehicle::airframe::{MassModel, MassProperties};
-use flight::vehicle::fins::Moments;
 use flight::vehicle::rigid::RigidState;
 use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
@@ -70,11 +69,11 @@ fn upright_fins(state: &RigidState, mass: &MassProperties) -> FinCommand {
     let up = state.world_from_body.inverse() * Vector3::z();
     let (rate, inertia) = (&state.rate_rad_s, mass.pitch_inertia_kg_m2);
     FinCommand {
-        moments: Moments {
-            roll_n_m: -0.02 * rate.x,
-            pitch_n_m: -inertia * (9.0 * up.z + 6.0 * rate.y),
-            yaw_n_m: inertia * (9.0 * up.y - 6.0 * rate.z),
-        },
+        moments_n_m: Vector3::new(
+            -0.02 * rate.x,
+            -inertia * (9.0 * up.z + 6.0 * rate.y),
+            inertia * (9.0 * up.y - 6.0 * rate.z),
+        ),
         drag_area_m2: 0.02,
     }
 }
@@ -97,7 +96,8 @@ fn fly(seed: u64) -> Vec<Frame> {
     let allocation = Allocation {
         model: airframe.fin_model(),
         arm_m: airframe.fins.station_m - airframe.mass.loaded_cg_station_m,
-        range: OpeningRange { min_rad: airframe.fins.control_min_rad(), max_rad: airframe.fins.open_rad() },
+        min_rad: airframe.fins.control_min_rad(),
+        max_rad: airframe.fins.open_rad(),
     };
     let mut actuators = Actuators { fins_rad: [1.2; 4], ..Actuators::default() };
     let mut frames = Vec::new();

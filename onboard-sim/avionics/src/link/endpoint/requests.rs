@@ -204,7 +204,7 @@ impl VehicleEndpoint {
         let here = (station, request.by);
         match request.command {
             CrewCommand::Arm if vehicle.phase() == Phase::PadArmed && self.stations.armed_by().is_none() => {
-                let proposal = vehicle.computer.crew().two_person.armed_by();
+                let proposal = vehicle.computer.crew().two_person.armed;
                 let two = matches!(vehicle.input().people, Some(People::Two { .. }));
                 let proposer = proposal.filter(|_| two).map(|one| (one.station, Some(one.by)));
                 self.stations.set_commander(Some(proposer.unwrap_or(here)));

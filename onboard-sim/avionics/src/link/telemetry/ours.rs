@@ -196,7 +196,7 @@ pub(super) fn mission(state: &VehicleState<'_>, boot_number: u32) -> MavMessage 
 pub(super) fn crew(state: &VehicleState<'_>, boot_number: u32) -> Option<MavMessage> {
     let people = state.input().people?;
     let crew = state.computer.crew();
-    let (ask, tap) = (crew.two_person.waiting(state.time_s), crew.two_person.tapping());
+    let (ask, tap) = (crew.two_person.waiting(state.time_s), crew.two_person.tapping);
     let commander = state.input().commander;
     let ms = |left_s: f64| (1000.0 * left_s).clamp(0.0, f64::from(u16::MAX)) as u16;
     let number = |operator: Option<Operator>| operator.map_or(0, |operator| operator.number);
@@ -257,18 +257,18 @@ pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64, boot_numbe
 
 /// The value at this index, or the state of the check while there are no values.
 pub(crate) fn pad_check(check: &PadCheck, place: usize, time_s: f64, boot_number: u32) -> MavMessage {
-    let findings = check.findings();
+    let findings = &check.findings;
     let mut data = TD_PAD_CHECK_DATA {
         boot_number,
         time_boot_ms: boot_ms(time_s),
         value: f32::NAN,
         least: f32::NAN,
         most: f32::NAN,
-        run: check.run(),
-        state: numbered(check.state() as u8),
+        run: check.run,
+        state: numbered(check.state as u8),
         progress: check.progress_percent(),
         found: u8::try_from(findings.len()).unwrap_or(u8::MAX),
-        asked_by: check.by().map_or(0, |by| by.number),
+        asked_by: check.by.map_or(0, |by| by.number),
         ..TD_PAD_CHECK_DATA::default()
     };
     if let Some(CheckedValue { item, value, least, most, verdict }) = findings.get(place).copied()

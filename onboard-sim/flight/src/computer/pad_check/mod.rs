@@ -58,15 +58,18 @@ enum Stage {
 /// The last check, and the running one.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct PadCheck {
-    run: u16,
-    state: CheckState,
+    /// Number of checks since power-up; 0 before the first.
+    pub run: u16,
+    pub state: CheckState,
     stage: Stage,
-    by: Option<Operator>,
+    /// The operator who requested it; `None` without operators.
+    pub by: Option<Operator>,
     /// Frames of the sweep, before the sensors are observed.
     swept_frames: u64,
     /// Frame until which the surfaces return to rest.
     returns_until: u64,
-    findings: Vec<CheckedValue>,
+    /// Findings so far, in order of detection.
+    pub findings: Vec<CheckedValue>,
     /// The people who have seen every surface move as shown on the crew's page.
     seen_by: Vec<Option<Operator>>,
 }
@@ -157,25 +160,6 @@ impl PadCheck {
         self.is_running() || frame < self.returns_until
     }
 
-    pub fn state(&self) -> CheckState {
-        self.state
-    }
-
-    /// Number of checks since power-up; 0 before the first.
-    pub fn run(&self) -> u16 {
-        self.run
-    }
-
-    /// The operator who requested it; `None` without operators.
-    pub fn by(&self) -> Option<Operator> {
-        self.by
-    }
-
-    /// Findings so far, in order of detection.
-    pub fn findings(&self) -> &[CheckedValue] {
-        &self.findings
-    }
-
     /// Progress of the running check, percent.
     pub fn progress_percent(&self) -> u8 {
         let still_frames = u64::from(sweep::STILL_FRAMES);
@@ -192,7 +176,12 @@ impl PadCheck {
 
     /// The result as text for the crew.
     pub(super) fn words(&self) -> String {
-        words_of_findings(&self.findings)
+        let mut failed = self.findings.iter().filter(|found| found.verdict == Verdict::NotOk);
+        match (failed.next(), failed.count()) {
+            (None, _) => format!("check passed: {} values found", self.findings.len()),
+            (Some(first), 0) => format!("check FAILED: {}", first.item.name()),
+            (Some(first), more) => format!("check FAILED: {} and {more} more", first.item.name()),
+        }
     }
 }
 
@@ -303,24 +292,22 @@ pub struct CheckedValue {
     pub verdict: Verdict,
 }
 
-impl CheckedValue {
-    /// A value with a minimum. NaN fails.
-    fn at_least(item: Item, value: f64, least: f64) -> Self {
-        Self { item, value, least, most: f64::NAN, verdict: judged(value >= least) }
-    }
+/// A value with a minimum. NaN fails.
+fn at_least(item: Item, value: f64, least: f64) -> CheckedValue {
+    CheckedValue { item, value, least, most: f64::NAN, verdict: judged(value >= least) }
+}
 
-    /// A value with a maximum. NaN fails.
-    fn at_most(item: Item, value: f64, most: f64) -> Self {
-        Self { item, value, least: f64::NAN, most, verdict: judged(value <= most) }
-    }
+/// A value with a maximum. NaN fails.
+fn at_most(item: Item, value: f64, most: f64) -> CheckedValue {
+    CheckedValue { item, value, least: f64::NAN, most, verdict: judged(value <= most) }
+}
 
-    fn between(item: Item, value: f64, least: f64, most: f64) -> Self {
-        Self { item, value, least, most, verdict: judged((least..=most).contains(&value)) }
-    }
+fn between(item: Item, value: f64, least: f64, most: f64) -> CheckedValue {
+    CheckedValue { item, value, least, most, verdict: judged((least..=most).contains(&value)) }
+}
 
-    fn only_shown(item: Item, value: f64) -> Self {
-        Self { item, value, least: f64::NAN, most: f64::NAN, verdict: Verdict::NotJudged }
-    }
+fn only_shown(item: Item, value: f64) -> CheckedValue {
+    CheckedValue { item, value, least: f64::NAN, most: f64::NAN, verdict: Verdict::NotJudged }
 }
 
 /// The larger of two; NaN if either is NaN, unlike `max`.
@@ -338,35 +325,19 @@ fn findings_of_switches(
     mission: &Mission,
     arming: &ArmingLimits,
 ) -> impl Iterator<Item = CheckedValue> {
-    let closed = |item, closed: bool| CheckedValue::at_least(item, f64::from(u8::from(closed)), 1.0);
+    let closed = |item, closed: bool| at_least(item, f64::from(u8::from(closed)), 1.0);
     let on_a_rail = mission.start.at == StartPoint::Pad;
     [
         Some(closed(Item::IgniterContinuity, input.igniter_continuity)),
         on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
         // In while people work at the vehicle, out before arming: both states are correct.
-        Some(CheckedValue::only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
-        input
-            .battery_v
-            .map(|volts| CheckedValue::at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        Some(only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
+        input.battery_v.map(|volts| at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
         Some(closed(Item::LogRunning, input.log.running)),
-        Some(CheckedValue::at_least(
-            Item::LogSpace,
-            input.log.space_bytes as f64,
-            arming.log_space_min_bytes as f64,
-        )),
+        Some(at_least(Item::LogSpace, input.log.space_bytes as f64, arming.log_space_min_bytes as f64)),
     ]
     .into_iter()
     .flatten()
-}
-
-/// Number of values outside their limits, with the first of them.
-fn words_of_findings(findings: &[CheckedValue]) -> String {
-    let mut failed = findings.iter().filter(|found| found.verdict == Verdict::NotOk);
-    match (failed.next(), failed.count()) {
-        (None, _) => format!("check passed: {} values found", findings.len()),
-        (Some(first), 0) => format!("check FAILED: {}", first.item.name()),
-        (Some(first), more) => format!("check FAILED: {} and {more} more", first.item.name()),
-    }
 }
 
 // Permission to run the check, and its end.
@@ -453,7 +424,7 @@ impl Computer {
             Some((surface, angle_rad)) => self.commands.fins_rad[surface - 2] = angle_rad,
             None => {}
         }
-        match self.pad_check.state() {
+        match self.pad_check.state {
             CheckState::Passed => self.table.report(Severity::Notice, self.pad_check.words()),
             CheckState::Failed => self.table.report(Severity::Warning, self.pad_check.words()),
             CheckState::NotRun | CheckState::Running | CheckState::Stopped => {}

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::{CheckedValue, Item, SURFACES, SurfaceCommand, larger};
+use super::{CheckedValue, Item, SURFACES, SurfaceCommand, at_least, at_most, between, larger, only_shown};
 use crate::computer::pad::ANSWERING_RAD;
 use crate::computer::{FRAME_MS, FRAME_S};
 use crate::estimation::estimator::Measurements;
@@ -183,19 +183,15 @@ impl Sweep {
     fn findings(&self, reach: &Reach) -> [CheckedValue; 3] {
         if !self.feedback {
             return [Item::Range, Item::Error, Item::Lag]
-                .map(|item| CheckedValue::only_shown(item(self.surface), f64::NAN));
+                .map(|item| only_shown(item(self.surface), f64::NAN));
         }
         let SurfaceShown { least_rad, most_rad, error_rad, lag_s } = self.shown;
         let whole_rad = reach.high_rad - reach.low_rad;
         [
             // The same tolerance as at power-up and before arming, at both ends.
-            CheckedValue::at_least(
-                Item::Range(self.surface),
-                most_rad - least_rad,
-                whole_rad - 2.0 * ANSWERING_RAD,
-            ),
-            CheckedValue::at_most(Item::Error(self.surface), error_rad, ANSWERING_RAD),
-            CheckedValue::at_most(Item::Lag(self.surface), lag_s, reach.lag_most_s()),
+            at_least(Item::Range(self.surface), most_rad - least_rad, whole_rad - 2.0 * ANSWERING_RAD),
+            at_most(Item::Error(self.surface), error_rad, ANSWERING_RAD),
+            at_most(Item::Lag(self.surface), lag_s, reach.lag_most_s()),
         ]
     }
 }
@@ -308,34 +304,21 @@ impl Still {
         let largest = |spreads: &[Spread; 3]| spreads.iter().map(Spread::sigma).fold(0.0, larger);
         let speed_m_s = (self.velocity_sum_m_s / f64::from(self.fixes)).norm();
         let found = [
-            CheckedValue::at_most(Item::GyroBias, mean(&self.gyro_rad_s), BIAS_MAX_RAD_S),
-            CheckedValue::at_most(Item::GyroNoise, largest(&self.gyro_rad_s), SPREAD_MOST * gyro_rad_s),
-            CheckedValue::between(
-                Item::Gravity,
-                mean(&self.force_m_s2),
-                *AT_REST_M_S2.start(),
-                *AT_REST_M_S2.end(),
-            ),
-            CheckedValue::at_most(
-                Item::AccelerometerNoise,
-                largest(&self.force_m_s2),
-                SPREAD_MOST * accelerometer_m_s2,
-            ),
-            CheckedValue::at_most(
-                Item::BarometerNoise,
-                self.pressure_altitude_m.sigma(),
-                SPREAD_MOST * barometer_m,
-            ),
-            CheckedValue::at_least(Item::GnssFixes, f64::from(self.fixes), FIXES_LEAST),
-            CheckedValue::at_most(Item::GnssSpeed, speed_m_s, arming.speed_max_m_s),
-            CheckedValue::only_shown(Item::LidarRange, self.lidar_m.unwrap_or(f64::NAN)),
+            at_most(Item::GyroBias, mean(&self.gyro_rad_s), BIAS_MAX_RAD_S),
+            at_most(Item::GyroNoise, largest(&self.gyro_rad_s), SPREAD_MOST * gyro_rad_s),
+            between(Item::Gravity, mean(&self.force_m_s2), *AT_REST_M_S2.start(), *AT_REST_M_S2.end()),
+            at_most(Item::AccelerometerNoise, largest(&self.force_m_s2), SPREAD_MOST * accelerometer_m_s2),
+            at_most(Item::BarometerNoise, self.pressure_altitude_m.sigma(), SPREAD_MOST * barometer_m),
+            at_least(Item::GnssFixes, f64::from(self.fixes), FIXES_LEAST),
+            at_most(Item::GnssSpeed, speed_m_s, arming.speed_max_m_s),
+            only_shown(Item::LidarRange, self.lidar_m.unwrap_or(f64::NAN)),
         ];
         if !hangs {
             return found;
         }
         found.map(|found| match found.item {
             Item::GnssFixes => found,
-            item => CheckedValue::only_shown(item, found.value),
+            item => only_shown(item, found.value),
         })
     }
 
@@ -349,6 +332,6 @@ impl Still {
         let sensed = Vector3::from(self.force_m_s2.map(|spread| spread.mean));
         let lean_rad = libm::atan2(sensed.cross(&up).norm(), sensed.dot(&up));
         let stated_rad = libm::hypot(RAIL_LEVEL_DEG, mission.estimator.mounting_deg).to_radians();
-        Some(CheckedValue::at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
+        Some(at_most(Item::RailLean, lean_rad, LEAN_SIGMAS * stated_rad))
     }
 }

@@ -56,12 +56,8 @@ impl Pilot {
                 self.try_apply(table, Event::FinsConfirmed, time_s);
             }
             Phase::AeroDescent => {
-                let soon = self
-                    .prediction
-                    .ignition
-                    .command_in_s
-                    .is_some_and(|in_s| in_s <= self.model.mission.ignition.arm_before_s);
-                if soon {
+                let arm_before_s = self.model.mission.ignition.arm_before_s;
+                if self.prediction.ignition.command_in_s.is_some_and(|in_s| in_s <= arm_before_s) {
                     self.try_apply(table, Event::LandArm, time_s);
                 }
             }
@@ -272,18 +268,15 @@ impl Pilot {
         // From any lower, the parachute reaches the ground before it is ejected.
         let ejected =
             feet_m.max(estimated_m) > filling_m - self.model.airframe().parachute.inflation_distance_m;
-        if self.is_astray(sensors) {
+        let parachute_fills = if self.is_astray(sensors) {
             // The attitude is lost, and only the pressure gives a height: waiting gains nothing.
-            let parachute_fills = pressure_m.is_none_or(|pressure_m| pressure_m > filling_m);
-            return Some((
-                Event::GateShutForGood { parachute_fills },
-                self.why_given_up(&checks, input.time_s),
-            ));
-        }
-        (hopeless && ejected).then(|| {
-            let event = Event::GateShutForGood { parachute_fills: feet_m > filling_m };
-            (event, self.why_given_up(&checks, input.time_s))
-        })
+            pressure_m.is_none_or(|pressure_m| pressure_m > filling_m)
+        } else if hopeless && ejected {
+            feet_m > filling_m
+        } else {
+            return None;
+        };
+        Some((Event::GateShutForGood { parachute_fills }, self.why_given_up(&checks, input.time_s)))
     }
 
     /// Without inertial data, or with an estimate that two of three speeds contradict, no landing

@@ -42,6 +42,6 @@ pub(crate) fn input(frame: u64, gyro_rad_s: f64) -> SensedInput {
         pin_out: true,
         log: LogState { running: true, space_bytes: u64::MAX },
         uplink: Uplink::NotNeeded,
-        ..SensedInput::NONE
+        ..SensedInput::default()
     }
 }

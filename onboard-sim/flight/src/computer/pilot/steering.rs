@@ -7,13 +7,12 @@ use super::vehicle_model::Burning;
 use super::{Pilot, Pointed};
 use crate::computer::SensedInput;
 use crate::control::aim::Aim;
-use crate::control::fins::{Allocation, FinCommand, OpeningRange};
+use crate::control::fins::{Allocation, FinCommand};
 use crate::estimation::estimator::Estimate;
 use crate::guidance::descent::{DescentSituation, LEAST_AIRSPEED_M_S};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Mode, Phase};
 use crate::vehicle::airframe::MassProperties;
-use crate::vehicle::fins::Moments;
 
 /// Thrust below which the gimbal cannot turn the vehicle, N.
 const STEERING_THRUST_N: f64 = 3.0;
@@ -143,7 +142,7 @@ impl Pilot {
             time_to_go_s: self.prediction.ignition.command_in_s,
         };
         let demand = self.model.mission.descent.demand(&estimate.state, &situation);
-        let (moments, drag_area_m2, min_rad) = if burning {
+        let (moments_n_m, drag_area_m2, min_rad) = if burning {
             // During the burn the gimbal turns the vehicle; the fins brake and cancel the roll
             // rate.
             (Vector3::new(demand.moment_n_m.x, 0.0, 0.0), self.fin_share * largest_m2, fins.closed_rad())
@@ -157,12 +156,9 @@ impl Pilot {
         let allocation = Allocation {
             model: self.model.airframe().fin_model(),
             arm_m: fins.station_m - mass.cg_station_m,
-            range: OpeningRange { min_rad, max_rad: fins.open_rad() },
+            min_rad,
+            max_rad: fins.open_rad(),
         };
-        let command = FinCommand {
-            moments: Moments { roll_n_m: moments.x, pitch_n_m: moments.y, yaw_n_m: moments.z },
-            drag_area_m2,
-        };
-        allocation.openings_rad(&command, demand.dynamic_pressure_pa)
+        allocation.openings_rad(&FinCommand { moments_n_m, drag_area_m2 }, demand.dynamic_pressure_pa)
     }
 }

@@ -9,7 +9,7 @@ use super::vertical_speed::SpeedReadings;
 use super::{FRAMES_PER_PLAN, Pilot, Prediction};
 use crate::computer::SensedInput;
 use crate::computer::table::PhaseTable;
-use crate::estimation::estimator::{Estimate, Measurements, VehicleNow};
+use crate::estimation::estimator::{Estimate, Measurements};
 use crate::estimation::motor_estimate::MotorSample;
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::phase::{Event, Mode, Phase};
@@ -29,19 +29,6 @@ const STILL_RAD_S: f64 = 0.05;
 /// off by some 0.3 m/s^2 for half a second.
 const EXPECTED_FORCE_M_S: f64 = 0.02;
 
-/// Measurements usable before apogee. The booster changes drag and masses, so the specific force
-/// shows no wind. The barometer's ram error is for flow from the tail, and its static ports are in
-/// the booster's wake and in the charge's gas; the lidar faces the booster.
-fn on_the_way_up(
-    measurements: &Measurements,
-    vehicle: &VehicleNow,
-    phase: Phase,
-) -> (Measurements, VehicleNow) {
-    let measurements = Measurements { pressure_altitude_m: None, lidar_range_m: None, ..*measurements };
-    let shaken = phase == Phase::Boost;
-    (measurements, VehicleNow { motor_burning: shaken, air_density_kg_m3: 0.0, ..*vehicle })
-}
-
 impl Pilot {
     /// Estimates the vehicle's state, and its motor and drag.
     pub(crate) fn estimate_state(
@@ -51,7 +38,7 @@ impl Pilot {
         sensors: &SensorWatch,
     ) {
         // Also on the ground, where the gimbal continues to balance.
-        self.speeds.watch_accelerometer(sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S);
+        self.speeds.accelerometer_lost = sensors.accelerometer_lost_s() >= ACCELEROMETER_LOST_S;
         let thrust_sensed = !(self.model.motor.burns() && sensors.accelerometer_is_lost());
         let mut estimate = self.estimated(phase, input, thrust_sensed);
         // A vehicle may be dragged by its parachute: fixes show it, or its rotation does.
@@ -129,12 +116,14 @@ impl Pilot {
         let height_m = self.estimate.map_or(0.0, |estimate| estimate.state.position_m.z);
         let air = self.model.mission.site.air_at_m(height_m);
         let burns = burning_s.is_some() || phase.in_landing_burn();
-        let vehicle = self.model.now(&mass, air.density_kg_m3, input.fins_rad, burns);
-        let (measurements, vehicle) = if phase.before_apogee() {
-            on_the_way_up(&measurements, &vehicle, phase)
-        } else {
-            (measurements, vehicle)
-        };
+        let mut vehicle = self.model.now(&mass, air.density_kg_m3, input.fins_rad, burns);
+        if phase.before_apogee() {
+            // The booster changes drag and masses, so the specific force shows no wind. The
+            // barometer's ram error is for flow from the tail, and its static ports are in the
+            // booster's wake and in the charge's gas; the lidar faces the booster.
+            (measurements.pressure_altitude_m, measurements.lidar_range_m) = (None, None);
+            (vehicle.motor_burning, vehicle.air_density_kg_m3) = (phase == Phase::Boost, 0.0);
+        }
         self.estimator.step(&measurements, &vehicle)
     }
 

@@ -56,17 +56,13 @@ with_defaults! {
         pressure_at_s: f64 = f64::NEG_INFINITY,
         contradicted_s: f64 = 0.0,
         /// The accelerometer is frozen or silent, and the estimate with it.
-        accelerometer_lost: bool = false,
+        pub(super) accelerometer_lost: bool = false,
         /// Speed of the first in the present run of confirmed fixes, m/s.
         confirmed_from_m_s: Option<f64> = None,
     }
 }
 
 impl VerticalSpeeds {
-    pub(super) fn watch_accelerometer(&mut self, lost: bool) {
-        self.accelerometer_lost = lost;
-    }
-
     /// After a reset only the estimate contains the meantime.
     pub(super) fn resumed(self) -> Self {
         Self { inertial_m_s: None, ..self }

@@ -160,23 +160,23 @@ impl PadAlignment {
     fn mean(seconds: &[Self]) -> Self {
         let mut mean = Self::default();
         for second in seconds {
-            mean.samples += second.samples;
-            let share = f64::from(second.samples) / f64::from(mean.samples.max(1));
-            mean.gyro_rad_s += (second.gyro_rad_s - mean.gyro_rad_s) * share;
-            mean.specific_force_m_s2 += (second.specific_force_m_s2 - mean.specific_force_m_s2) * share;
+            mean.add(second.samples, &second.gyro_rad_s, &second.specific_force_m_s2);
         }
         mean
     }
 
+    fn add(&mut self, samples: u32, gyro_rad_s: &Vector3<f64>, specific_force_m_s2: &Vector3<f64>) {
+        self.samples = self.samples.saturating_add(samples);
+        let share = f64::from(samples) / f64::from(self.samples.max(1));
+        self.gyro_rad_s += (gyro_rad_s - self.gyro_rad_s) * share;
+        self.specific_force_m_s2 += (specific_force_m_s2 - self.specific_force_m_s2) * share;
+    }
+
     /// Takes one sample; an impossible sample is ignored.
     pub fn take(&mut self, imu: &ImuSample) {
-        if !imu.is_plausible() {
-            return;
+        if imu.is_plausible() {
+            self.add(1, &imu.gyro_rad_s, &imu.specific_force_m_s2);
         }
-        self.samples = self.samples.saturating_add(1);
-        let share = 1.0 / f64::from(self.samples);
-        self.gyro_rad_s += (imu.gyro_rad_s - self.gyro_rad_s) * share;
-        self.specific_force_m_s2 += (imu.specific_force_m_s2 - self.specific_force_m_s2) * share;
     }
 
     /// The alignment for a heading about the vertical, rad: 0 is [`upright`].

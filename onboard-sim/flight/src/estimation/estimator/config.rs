@@ -1,7 +1,6 @@
 //! The assumed sensor errors, as data. The defaults are those of hobby-grade sensors: a consumer
 //! inertial unit, a barometer, a single-frequency satellite receiver and a 12 m lidar.
 
-use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::vehicle::mission::StartPoint;
@@ -109,8 +108,7 @@ with_defaults! {
 }
 
 /// Standard deviations of the initial state.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StartUncertainty {
     /// Horizontal position, each axis, m.
     pub horizontal_m: f64,
@@ -180,25 +178,6 @@ impl StartUncertainty {
             gnss_vertical_offset_m: 1.1,
             levelled: false,
         }
-    }
-
-    /// Of the position, each axis of the world, m.
-    pub(super) fn position_m(&self) -> Vector3<f64> {
-        Vector3::new(self.horizontal_m, self.horizontal_m, self.height_m)
-    }
-
-    /// Of the attitude, about each axis of the world, rad.
-    pub(super) fn attitude_rad(&self) -> Vector3<f64> {
-        Vector3::new(self.tilt_deg, self.tilt_deg, self.heading_deg).map(f64::to_radians)
-    }
-
-    /// Of the satellite position's offset, each axis of the world, m.
-    pub(super) fn gnss_offset_m(&self) -> Vector3<f64> {
-        Vector3::new(
-            self.gnss_horizontal_offset_m,
-            self.gnss_horizontal_offset_m,
-            self.gnss_vertical_offset_m,
-        )
     }
 }
 

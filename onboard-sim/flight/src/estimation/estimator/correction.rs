@@ -94,11 +94,6 @@ impl AidStatus {
         self.count(accepted);
     }
 
-    /// Rejects a measurement that cannot be predicted.
-    pub(super) fn refuse(&mut self) {
-        self.count(false);
-    }
-
     /// Discards the three components of a fix without information on the estimate.
     pub(super) fn discard(&mut self) {
         self.fresh = true;

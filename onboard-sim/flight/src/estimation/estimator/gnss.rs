@@ -81,7 +81,7 @@ impl Estimator {
         self.catch_up();
         let upright = (self.nominal.world_from_body * nalgebra::Vector3::x()).z;
         let leaning = if upright < libm::cos(LEANS_RAD) { LEANING_NOISE } else { 1.0 };
-        let [lever_m, lever_m_s] = self.history.lever();
+        let [lever_m, lever_m_s] = self.history.lever;
         let off_m_s = self.since_fix(fix).map_or(0.0, |since| {
             (fix.velocity_m_s - self.nominal.velocity_m_s - lever_m_s + since.gained_m_s).norm()
         });
@@ -93,7 +93,7 @@ impl Estimator {
         let sigma_m_s = leaning * self.config.gnss_velocity_m_s.max(fix.quality.speed_m_s);
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
-                self.aids.gnss_velocity.refuse();
+                self.aids.gnss_velocity.count(false);
                 continue;
             };
             // The past velocity is the present one minus the gain since. The gain depends on the
@@ -125,7 +125,7 @@ impl Estimator {
         }
         for axis in 0..3 {
             let Some(since) = self.since_fix(fix) else {
-                self.aids.gnss_position.refuse();
+                self.aids.gnss_position.count(false);
                 continue;
             };
             let then_m_s = self.nominal.velocity_m_s[axis] + lever_m_s[axis] - since.gained_m_s[axis];
@@ -164,7 +164,7 @@ impl Estimator {
 
     /// The motion since a fix was valid, by its time tag less the tag's estimated error.
     pub(super) fn since_fix(&self, fix: &GnssFix) -> Option<Since> {
-        let [_, lever_m_s] = self.history.lever();
+        let [_, lever_m_s] = self.history.lever;
         let antenna_m_s = self.nominal.velocity_m_s + lever_m_s;
         self.history.since(fix.valid_at_s - self.nominal.gnss_time_tag_s, &antenna_m_s)
     }

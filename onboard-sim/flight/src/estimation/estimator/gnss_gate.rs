@@ -45,7 +45,7 @@ pub(super) const REPORTED_M: f64 = 5.0;
 const SATELLITES: u32 = 4;
 
 /// The last fix, whether it was admitted or not.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 struct Reference {
     position_m: Vector3<f64>,
     velocity_m_s: Vector3<f64>,
@@ -62,12 +62,12 @@ impl Reference {
 }
 
 /// State of the gate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub(super) struct GnssGate {
     last: Reference,
     /// Whether the last reference is a fix, and not the start.
     has_fix: bool,
-    quarantined: bool,
+    pub(super) quarantined: bool,
     /// The quarantine began with the first fix after an outage.
     after_outage: bool,
     /// Change of velocity that the last fixes have followed in a row, m/s.
@@ -78,7 +78,7 @@ pub(super) struct GnssGate {
     blind_frames: u32,
     repeated_frames: u32,
     /// Velocity gained in unmeasured shocks since then, m/s.
-    shock_m_s: f64,
+    pub(super) shock_m_s: f64,
     /// Velocity of the fix admitted in this frame, m/s.
     admitted_m_s: Option<Vector3<f64>>,
 }
@@ -86,29 +86,8 @@ pub(super) struct GnssGate {
 impl GnssGate {
     /// Before the first fix, of a vehicle with this velocity, world, m/s.
     pub(super) fn new(velocity_m_s: &Vector3<f64>) -> Self {
-        let (zero, velocity_m_s) = (Vector3::zeros(), *velocity_m_s);
-        Self {
-            last: Reference { position_m: zero, velocity_m_s, valid_at_s: 0.0, gained_m_s: zero },
-            has_fix: false,
-            quarantined: false,
-            after_outage: false,
-            followed_m_s: 0.0,
-            force_m_s: 0.0,
-            blind_frames: 0,
-            repeated_frames: 0,
-            shock_m_s: 0.0,
-            admitted_m_s: None,
-        }
-    }
-
-    /// Announces a change of velocity that no inertial unit measures, m/s.
-    pub(super) fn expect_shock(&mut self, gained_m_s: f64) {
-        self.shock_m_s += gained_m_s;
-    }
-
-    /// Ends the quarantine: another sensor confirms the receiver.
-    pub(super) fn trust(&mut self) {
-        self.quarantined = false;
+        let last = Reference { velocity_m_s: *velocity_m_s, ..Reference::default() };
+        Self { last, ..Self::default() }
     }
 
     /// Begins a frame with the velocity gained by the specific force, m/s, whether it was measured,
@@ -141,7 +120,7 @@ impl Estimator {
     }
 
     fn follows_the_motion(&mut self, fix: &GnssFix) -> bool {
-        let [lever_m, lever_m_s] = self.history.lever();
+        let [lever_m, lever_m_s] = self.history.lever;
         let velocity_m_s = self.nominal.velocity_m_s + lever_m_s;
         let enough = fix.quality.satellites == 0 || fix.quality.satellites >= SATELLITES;
         let finite = fix.position_m.iter().chain(&fix.velocity_m_s).all(|value| value.is_finite());

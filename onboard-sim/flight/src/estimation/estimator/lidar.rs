@@ -48,7 +48,7 @@ impl Estimator {
     pub(super) fn take_lidar(&mut self, range_m: f64, lever_m: &nalgebra::Vector3<f64>) {
         let nose = self.nominal.world_from_body * nalgebra::Vector3::x();
         if nose.z < LIDAR_COS_TILT {
-            self.aids.lidar.refuse();
+            self.aids.lidar.count(false);
             return;
         }
         let state = &self.nominal;
@@ -83,7 +83,7 @@ impl Estimator {
         let repeated = range_m.to_bits() == self.last_range_m.to_bits() && climb_m_s.abs() > MOVES_M_S;
         self.last_range_m = range_m;
         if repeated || range_m < LIDAR_BLIND_M || self.others_contradict_m(measured_m * nose.z) {
-            self.aids.lidar.refuse();
+            self.aids.lidar.count(false);
             return;
         }
         let before_m = self.aids.lidar.innovation;

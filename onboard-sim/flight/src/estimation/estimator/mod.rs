@@ -54,7 +54,7 @@ pub use self::wind::VehicleNow;
 use crate::vehicle::rigid::RigidState;
 
 /// Standard deviations of an estimate, from the diagonal of the covariance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Sigmas {
     pub position_m: Vector3<f64>,
     pub velocity_m_s: Vector3<f64>,
@@ -106,14 +106,7 @@ impl Estimate {
             wind_m_s,
             gyro_bias_rad_s: zero,
             accelerometer_bias_m_s2: zero,
-            sigmas: Sigmas {
-                position_m: zero,
-                velocity_m_s: zero,
-                attitude_rad: zero,
-                gyro_bias_rad_s: zero,
-                accelerometer_bias_m_s2: zero,
-                wind_m_s: Vector2::zeros(),
-            },
+            sigmas: Sigmas::default(),
             heights: HeightSources {
                 inertial_m: height_m,
                 inertial_sigma_m: 0.0,
@@ -278,7 +271,7 @@ impl Estimator {
     pub(crate) fn take_shock(&mut self, gained_m_s: f64) {
         self.inflate_velocity(&(self.nominal.world_from_body * Vector3::x() * gained_m_s));
         self.history.restart();
-        self.gnss_gate.expect_shock(gained_m_s);
+        self.gnss_gate.shock_m_s += gained_m_s;
     }
 
     /// The estimate now.
@@ -394,15 +387,18 @@ fn start_heights(start: &StartUncertainty, height_m: f64) -> HeightChannel {
 fn start_covariance(start: &StartUncertainty, config: &EstimatorConfig, state: &RigidState) -> Covariance {
     let milli_g = 1e-3 * GRAVITY_M_S2;
     let mut sigmas: Row = [0.0; N];
-    sigmas[POSITION..VELOCITY].copy_from_slice(start.position_m().as_slice());
+    sigmas[POSITION..POSITION + 2].fill(start.horizontal_m);
+    sigmas[POSITION + 2] = start.height_m;
     sigmas[VELOCITY..ATTITUDE].fill(start.velocity_m_s);
-    sigmas[ATTITUDE..GYRO_BIAS].copy_from_slice(start.attitude_rad().as_slice());
+    sigmas[ATTITUDE..ATTITUDE + 2].fill(start.tilt_deg.to_radians());
+    sigmas[ATTITUDE + 2] = start.heading_deg.to_radians();
     sigmas[GYRO_BIAS..ACCELEROMETER_BIAS].fill(start.gyro_bias_deg_s.to_radians());
     sigmas[ACCELEROMETER_BIAS..WIND].fill(start.accelerometer_bias_mg * milli_g);
     sigmas[WIND..BAROMETER_OFFSET].fill(start.wind_m_s);
     sigmas[BAROMETER_OFFSET] = start.barometer_offset_m;
     sigmas[BAROMETER_RAM] = start.barometer_ram;
-    sigmas[GNSS_OFFSET..GNSS_TIME_TAG].copy_from_slice(start.gnss_offset_m().as_slice());
+    sigmas[GNSS_OFFSET..GNSS_OFFSET + 2].fill(start.gnss_horizontal_offset_m);
+    sigmas[GNSS_OFFSET + 2] = start.gnss_vertical_offset_m;
     sigmas[GNSS_TIME_TAG] = config.gnss_time_tag_s;
     sigmas[BAROMETER_LATE] = config.barometer_late_s;
     sigmas[LIDAR_LATE] = config.lidar_late_s;
@@ -426,7 +422,7 @@ pub const LARGEST_RATE_RAD_S: f64 = 75.0;
 pub const LARGEST_SPECIFIC_FORCE_M_S2: f64 = 2000.0;
 
 /// Inertial measurement unit, the mean over the frame that has just ended.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct ImuSample {
     /// Rotation rate in body axes, rad/s.
     pub gyro_rad_s: Vector3<f64>,
@@ -435,10 +431,6 @@ pub struct ImuSample {
 }
 
 impl ImuSample {
-    /// Before the first sample.
-    pub(crate) const NONE: Self =
-        Self { gyro_rad_s: Vector3::new(0.0, 0.0, 0.0), specific_force_m_s2: Vector3::new(0.0, 0.0, 0.0) };
-
     /// Whether an inertial unit can produce these values: they are below [`LARGEST_RATE_RAD_S`] and
     /// [`LARGEST_SPECIFIC_FORCE_M_S2`] in each axis.
     pub fn is_plausible(&self) -> bool {
@@ -482,7 +474,7 @@ pub struct FixQuality {
 }
 
 /// All measurements of one frame; a sensor that did not report is `None`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Measurements {
     /// The inertial sample; every frame has one.
     pub imu: ImuSample,

@@ -69,7 +69,8 @@ impl Estimator {
         }
         self.heights = start_heights(&self.start, altitude_m);
         self.heights_without_lidar = self.heights;
-        self.gnss_gate.trust();
+        // The barometer confirms the receiver.
+        self.gnss_gate.quarantined = false;
         self.unhealthy_until_s = self.time_s() + health::UNHEALTHY_AFTER_RESTART_S;
     }
 }

@@ -269,7 +269,7 @@ pub(super) struct History {
     filled: usize,
     newest: usize,
     /// Lever arm of the antenna, m, and its velocity, m/s, in the newest frame, world.
-    lever: [Vector3<f64>; 2],
+    pub(super) lever: [Vector3<f64>; 2],
 }
 
 impl History {
@@ -304,11 +304,6 @@ impl History {
             position_m: before.position_m - before_m + (cg_m_s + gained_m_s * 0.5) * interval_s + lever_m,
         };
         self.lever = lever;
-    }
-
-    /// Lever arm of the antenna, m, and its velocity, m/s, in the newest frame, world.
-    pub(super) fn lever(&self) -> [Vector3<f64>; 2] {
-        self.lever
     }
 
     /// Sum of the velocity gained up to the newest frame, m/s.

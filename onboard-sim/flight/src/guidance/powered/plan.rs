@@ -1,5 +1,6 @@
 //! A plan of a landing, and its evaluation.
 
+use alloc::borrow::ToOwned as _;
 use alloc::vec::Vec;
 use serde::Serialize;
 
@@ -127,39 +128,23 @@ impl Plan {
     /// if their order is available.
     pub(super) fn take_last(&mut self, from: &Self, intervals: usize, settled_nodes: usize) -> bool {
         let Some(gone) = from.inputs.len().checked_sub(intervals) else { return false };
-        let refill = |into: &mut Vec<State>, all: &[State]| {
-            into.clear();
-            into.extend_from_slice(&all[gone..]);
-        };
-        refill(&mut self.states, &from.states);
-        refill(&mut self.costates, &from.costates);
-        self.inputs.clear();
-        self.inputs.extend_from_slice(&from.inputs[gone..]);
-        self.limits.clear();
-        self.limits.extend_from_slice(&from.limits[gone..]);
+        from.states[gone..].clone_into(&mut self.states);
+        from.costates[gone..].clone_into(&mut self.costates);
+        from.inputs[gone..].clone_into(&mut self.inputs);
+        from.limits[gone..].clone_into(&mut self.limits);
         self.conditions.clear();
         if settled_nodes == from.settled_nodes {
-            last_multipliers(
-                &from.conditions,
-                settled_nodes,
-                from.inputs.len(),
-                intervals,
-                &mut self.conditions,
-            );
+            let before = from.inputs.len();
+            last_multipliers(&from.conditions, settled_nodes, before, intervals, &mut self.conditions);
         }
         true
     }
 
     /// Reads the result of a solve.
     pub(super) fn read(&mut self, workspace: &Workspace, problem: &Problem, begins_s: f64) {
-        let refill = |into: &mut Vec<State>, all: &[State]| {
-            into.clear();
-            into.extend_from_slice(all);
-        };
-        refill(&mut self.states, workspace.states());
-        refill(&mut self.costates, workspace.costates());
-        self.inputs.clear();
-        self.inputs.extend_from_slice(workspace.inputs());
+        workspace.states().clone_into(&mut self.states);
+        workspace.costates().clone_into(&mut self.costates);
+        workspace.inputs().clone_into(&mut self.inputs);
         self.limits.clear();
         self.limits.extend(workspace.limit_multipliers());
         self.conditions.clear();

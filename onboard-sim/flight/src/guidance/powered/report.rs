@@ -114,7 +114,6 @@ pub struct PoweredSettings {
     pub quiet_s: f64,
     /// The same during this time before the expected contact of the lowest foot, whatever the plan,
     /// s.
-    #[serde(default)]
     pub contact_quiet_s: f64,
     /// Largest number of final times tried in a tick.
     pub max_solves: u32,

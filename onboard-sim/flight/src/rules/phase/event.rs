@@ -143,12 +143,6 @@ impl Effects {
         Self(effects.iter().fold(0, |bits, effect| bits | 1 << (*effect as u16)))
     }
 
-    /// The set with one more effect.
-    #[must_use]
-    pub fn with(self, effect: Effect) -> Self {
-        Self(self.0 | 1 << (effect as u16))
-    }
-
     /// Whether the effect is in the set.
     pub fn contains(self, effect: Effect) -> bool {
         self.0 & (1 << (effect as u16)) != 0

@@ -54,7 +54,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
     let phase = mode.phase;
     let locks = mode.interlocks;
     let go = |to: Phase| Row::Go(*mode, to, Effects::NONE);
-    let go_with = |to: Phase, effects: &[Effect]| Row::Go(*mode, to, Effects::of(effects));
+    let go_with = |to: Phase, effects: &[Effect]| goes(*mode, to, effects);
     let wrong = |action, only| Row::Refuse(Refusal::WrongPhase { action, phase, only });
     let latch = |interlocks: Interlocks| Mode { interlocks, ..*mode };
 
@@ -68,21 +68,18 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             let was_in = phase == P::PadIdle && mode.pad_wait_remaining_s(time_s).is_none();
             let aborted_before_s = mode.aborted_before_s.filter(|_| !was_in);
             let pulled = Mode { aborted_before_s, ..latch(Interlocks { pin_out: true, ..locks }) };
-            Row::Go(pulled, phase, Effects::NONE)
+            goes(pulled, phase, &[])
         }
-        (P::Safe | P::PadIdle, E::PinInserted) => {
-            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
+        (P::Safe | P::PadIdle | P::Touchdown | P::Safed, E::PinInserted) => {
+            goes(latch(Interlocks { pin_out: false, ..locks }), phase, &[])
         }
         (P::PadArmed, E::PinInserted) => disarmed(&latch(Interlocks { pin_out: false, ..locks })),
         // After the flight a person may insert the pin and pull it again. Without the pin, an
         // unignited motor is live.
-        (P::Touchdown | P::Safed, E::PinInserted) => {
-            Row::Go(latch(Interlocks { pin_out: false, ..locks }), phase, Effects::NONE)
-        }
         (P::Touchdown | P::Safed, E::PinPulled) => {
             let burnt = matches!(mode.motor, Motor::BurntOut { .. });
             let to = if burnt { phase } else { P::Touchdown };
-            Row::Go(latch(Interlocks { pin_out: true, ..locks }), to, Effects::NONE)
+            goes(latch(Interlocks { pin_out: true, ..locks }), to, &[])
         }
         (_, E::PinPulled | E::PinInserted) => wrong("move the pin", "it moves on the ground only"),
 
@@ -90,14 +87,14 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::PadIdle, E::ArmRequested { .. }) if !locks.pin_out => Row::Refuse(Refusal::PinIn),
         (P::PadIdle, E::ArmRequested { checks_passed: false }) => Row::Refuse(Refusal::ChecksFailed),
         (P::PadIdle, E::ArmRequested { checks_passed: true }) => {
-            Row::Go(latch(Interlocks { armed: true, ..locks }), P::PadArmed, Effects::NONE)
+            goes(latch(Interlocks { armed: true, ..locks }), P::PadArmed, &[])
         }
         (_, E::ArmRequested { .. }) => wrong("arm", "only PAD_IDLE arms"),
 
         (P::PadArmed, E::DisarmRequested { .. }) => disarmed(mode),
         // On the ground nothing is ignited any more, but that does not make the motor safe.
         (P::Touchdown, E::DisarmRequested { .. }) => {
-            Row::Go(latch(Interlocks { armed: false, ..locks }), phase, Effects::of(&[Effect::Disarm]))
+            goes(latch(Interlocks { armed: false, ..locks }), phase, &[Effect::Disarm])
         }
         // The igniter was energised: an abort's effects are the minimum.
         (P::Boost, E::DisarmRequested { lifted_off: false }) if !locks.abort_latched => {
@@ -111,10 +108,10 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             Some(_) => Row::Refuse(Refusal::CountdownRunning),
             None if !checks_passed => Row::Refuse(Refusal::ChecksFailed),
             None if !(countdown_s.is_finite() && countdown_s >= 0.0) => Row::Refuse(Refusal::BadCountdown),
-            None => Row::Go(
+            None => goes(
                 Mode { countdown_end_s: Some(time_s + countdown_s), hold: None, ..*mode },
                 phase,
-                Effects::of(&[Effect::StartCountdown]),
+                &[Effect::StartCountdown],
             ),
         },
         (_, E::StartRequested { .. }) => wrong("start", "only PAD_ARMED starts a countdown"),
@@ -122,10 +119,10 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         // A hold cancels the countdown: only a new start counts down again.
         (P::PadArmed, E::Hold { cause, start }) => match (mode.countdown_end_s, mode.hold) {
             (Some(_), _) if !mode.may_hold_for(cause, start, time_s) => Row::Refuse(Refusal::TooLateToHold),
-            (Some(_), _) => Row::Go(
+            (Some(_), _) => goes(
                 Mode { countdown_end_s: None, hold: Some(Hold { cause, at_s: time_s }), ..*mode },
                 phase,
-                Effects::of(&[Effect::HoldCountdown]),
+                &[Effect::HoldCountdown],
             ),
             (None, Some(_)) => Row::Refuse(Refusal::AlreadyHeld),
             (None, None) => Row::Refuse(Refusal::NoCountdown),
@@ -138,17 +135,15 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (_, E::HoldElapsed) => wrong("end a hold", "only PAD_ARMED is held"),
 
         // From here on the vehicle must not be approached, because the motor may ignite late.
-        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => Row::Go(
-            Mode { countdown_end_s: None, ..*mode },
-            P::Boost,
-            Effects::of(&[Effect::IgniteAscentMotor]),
-        ),
+        (P::PadArmed, E::CountdownElapsed) if countdown_over(mode, time_s) => {
+            goes(Mode { countdown_end_s: None, ..*mode }, P::Boost, &[Effect::IgniteAscentMotor])
+        }
         // A drone's pilot lets go when he likes, but not before the countdown is over, and not
         // while it is held.
         (P::PadArmed, E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone))
             if countdown_over(mode, time_s) =>
         {
-            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Deploy, Effects::of(&[Effect::FinsOpen]))
+            goes(Mode { countdown_end_s: None, ..*mode }, P::Deploy, &[Effect::FinsOpen])
         }
         (P::PadArmed, E::CountdownElapsed | E::ReleasedAt(StartPoint::Apogee | StartPoint::Drone)) => {
             Row::Refuse(Refusal::CountdownNotElapsed)
@@ -159,20 +154,16 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         // It falls, whatever the crew intended: without its motor, under the parachute if that
         // still helps.
         (P::Safe | P::PadIdle | P::PadArmed, E::ReleasedEarly { parachute_fills }) => {
-            Row::Go(inhibited(mode), P::Chute, down_without_the_motor(parachute_fills))
+            down_without_the_motor(mode, parachute_fills)
         }
         (_, E::ReleasedEarly { .. }) => wrong("release early", "only a hanging vehicle is released"),
 
         // Ascent.
         // Also without a countdown: a rising vehicle must be controlled.
-        (P::PadArmed, E::LiftOff) => {
-            Row::Go(Mode { countdown_end_s: None, ..*mode }, P::Boost, Effects::NONE)
-        }
+        (P::PadArmed, E::LiftOff) => goes(Mode { countdown_end_s: None, ..*mode }, P::Boost, &[]),
         // An uncommanded lift-off, or a late ignition after an abort: the vehicle rises, and
         // descends under the parachute.
-        (P::Safe | P::PadIdle, E::LiftOff) => {
-            Row::Go(inhibited(mode), P::Boost, Effects::of(&[Effect::InhibitLandingMotor]))
-        }
+        (P::Safe | P::PadIdle, E::LiftOff) => goes(inhibited(mode), P::Boost, &[Effect::InhibitLandingMotor]),
         (P::Boost, E::LiftOff) => go(phase),
         (_, E::LiftOff) => wrong("lift off", "only a vehicle on its pad and BOOST lift off"),
         (P::Boost, E::NoLiftOff) => stays_on_its_pad(mode),
@@ -180,7 +171,7 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         (P::Boost, E::Burnout) => go(P::Coast),
         // Burnout of the landing motor, which occurs once; ground contact decides what follows.
         (P::Powered | P::Touchdown, E::Burnout) if mode.motor == Motor::Burning => {
-            Row::Go(Mode { motor: Motor::BurntOut { at_s: time_s }, ..*mode }, phase, Effects::NONE)
+            goes(Mode { motor: Motor::BurntOut { at_s: time_s }, ..*mode }, phase, &[])
         }
         (P::Powered, E::Burnout) => go(phase),
         (_, E::Burnout) => wrong("burn out", "only BOOST, POWERED and a motor still burning in TOUCHDOWN do"),
@@ -190,11 +181,9 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             go_with(P::Chute, &[Effect::DeployChute])
         }
         // A vehicle with its booster can neither steer nor land.
-        (P::Boost | P::Coast, E::Apogee { booster_attached: true }) => Row::Go(
-            inhibited(mode),
-            P::Chute,
-            Effects::of(&[Effect::InhibitLandingMotor, Effect::DeployChute]),
-        ),
+        (P::Boost | P::Coast, E::Apogee { booster_attached: true }) => {
+            goes(inhibited(mode), P::Chute, &[Effect::InhibitLandingMotor, Effect::DeployChute])
+        }
         (P::Boost | P::Coast, E::Apogee { booster_attached: false }) => {
             go_with(P::Deploy, &[Effect::FinsOpen])
         }
@@ -211,19 +200,17 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
         }
         (_, E::IgnitionGate { .. }) => wrong("ignite", "only LAND_ARMED ignites, once"),
         (P::Deploy | P::AeroDescent | P::LandArmed, E::GateShutForGood { parachute_fills }) => {
-            Row::Go(inhibited(mode), P::Chute, down_without_the_motor(parachute_fills))
+            down_without_the_motor(mode, parachute_fills)
         }
         (_, E::GateShutForGood { .. }) => wrong("give up the ignition", "only a descent waits for it"),
 
         // Landing burn. A late light after "no light" counts as thrust, too.
-        (P::Ignition, E::ThrustConfirmed) => {
-            Row::Go(Mode { motor: Motor::Burning, ..*mode }, P::Powered, Effects::NONE)
-        }
+        (P::Ignition, E::ThrustConfirmed) => goes(Mode { motor: Motor::Burning, ..*mode }, P::Powered, &[]),
         (_, E::ThrustConfirmed) => wrong("confirm thrust", "only IGNITION waits for it"),
-        (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => Row::Go(
+        (P::Ignition, E::NoThrustTimeout) if !locks.no_light_latched => goes(
             latch(Interlocks { no_light_latched: true, landing_motor_inhibited: true, ..locks }),
             phase,
-            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
+            &[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss],
         ),
         (P::Ignition, E::NoThrustTimeout) => go(phase),
         (_, E::NoThrustTimeout) => wrong("miss thrust", "only IGNITION waits for it"),
@@ -237,10 +224,10 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
             wrong("touch down", "only a vehicle in the air touches down")
         }
         (_, E::Contact { thrust_below_weight: false }) => Row::Refuse(Refusal::ThrustAboveWeight),
-        (_, E::Contact { thrust_below_weight: true }) => Row::Go(
+        (_, E::Contact { thrust_below_weight: true }) => goes(
             latch(Interlocks { landing_motor_inhibited: true, ..locks }),
             P::Touchdown,
-            Effects::of(&[Effect::InhibitLandingMotor]),
+            &[Effect::InhibitLandingMotor],
         ),
         (P::Touchdown, E::SafingDone) => {
             if let Err(refusal) = mode.may_be_safed(time_s) {
@@ -256,11 +243,16 @@ fn row(mode: &Mode, event: Event, time_s: f64) -> Row {
 /// Effects of changing from a descent to the parachute.
 const TO_THE_PARACHUTE: [Effect; 3] = [Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute];
 
+/// A row with its effects.
+fn goes(mode: Mode, to: Phase, effects: &[Effect]) -> Row {
+    Row::Go(mode, to, Effects::of(effects))
+}
+
 /// Without the motor only the parachute brakes: too low to fill, it still takes off some of the
 /// speed.
-fn down_without_the_motor(parachute_fills: bool) -> Effects {
-    let effects = Effects::of(&TO_THE_PARACHUTE);
-    if parachute_fills { effects } else { effects.with(Effect::RecordLoss) }
+fn down_without_the_motor(mode: &Mode, parachute_fills: bool) -> Row {
+    let lost = [Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::DeployChute, Effect::RecordLoss];
+    goes(inhibited(mode), Phase::Chute, if parachute_fills { &TO_THE_PARACHUTE } else { &lost })
 }
 
 /// Permanently inhibits the landing motor.
@@ -278,7 +270,7 @@ fn stays_on_its_pad(mode: &Mode) -> Row {
     let inhibited = inhibited(mode);
     let interlocks = Interlocks { armed: false, ..inhibited.interlocks };
     let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
-    Row::Go(Mode { interlocks, ..inhibited }, Phase::PadIdle, Effects::of(&effects))
+    goes(Mode { interlocks, ..inhibited }, Phase::PadIdle, &effects)
 }
 
 /// The abort column: the effect of an abort in each phase.
@@ -304,7 +296,7 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
         P::Ignition | P::Powered if locks.lands_in_place => Row::Refuse(Refusal::AlreadyAborted),
         P::Ignition | P::Powered => {
             let interlocks = Interlocks { abort_latched: true, lands_in_place: true, ..locks };
-            Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
+            goes(Mode { interlocks, ..*mode }, phase, &[])
         }
         P::Safe | P::PadIdle | P::PadArmed if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
         P::Safe | P::PadIdle | P::PadArmed => {
@@ -312,14 +304,14 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
             let effects = [Effect::InhibitLandingMotor, Effect::Disarm, Effect::ShowPadWait];
             let to = if phase == P::PadArmed { P::PadIdle } else { phase };
             // The wait runs from the abort, even if the phase stays.
-            Row::Go(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, Effects::of(&effects))
+            goes(Mode { interlocks, entered_at_s: time_s, ..inhibited }, to, &effects)
         }
         P::Boost | P::Coast if locks.abort_latched => Row::Refuse(Refusal::AlreadyAborted),
         P::Boost if !lifted_off => stays_on_its_pad(mode),
-        P::Boost | P::Coast => Row::Go(inhibited, phase, Effects::of(&[Effect::InhibitLandingMotor])),
+        P::Boost | P::Coast => goes(inhibited, phase, &[Effect::InhibitLandingMotor]),
         // A repeated abort on the way down may still have enough height for the parachute.
         P::Deploy | P::AeroDescent | P::LandArmed if above_commit_height => {
-            Row::Go(inhibited, P::Chute, Effects::of(&TO_THE_PARACHUTE))
+            goes(inhibited, P::Chute, &TO_THE_PARACHUTE)
         }
         P::Deploy | P::AeroDescent | P::LandArmed if locks.abort_latched => {
             Row::Refuse(Refusal::AlreadyAborted)
@@ -330,13 +322,11 @@ fn abort(mode: &Mode, lifted_off: bool, above_commit_height: bool, gate_open: bo
         // them (seed 2001).
         P::Deploy | P::AeroDescent | P::LandArmed if may_burn => {
             let interlocks = Interlocks { abort_latched: true, lands_in_place: true, ..locks };
-            Row::Go(Mode { interlocks, ..*mode }, phase, Effects::NONE)
+            goes(Mode { interlocks, ..*mode }, phase, &[])
         }
-        P::Deploy | P::AeroDescent | P::LandArmed => Row::Go(
-            inhibited,
-            phase,
-            Effects::of(&[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss]),
-        ),
+        P::Deploy | P::AeroDescent | P::LandArmed => {
+            goes(inhibited, phase, &[Effect::InhibitLandingMotor, Effect::FinsOpen, Effect::RecordLoss])
+        }
     }
 }
 

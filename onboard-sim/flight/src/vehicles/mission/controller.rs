@@ -63,11 +63,8 @@ impl Formulas<'_> {
         // There the motor has most room to swing in the tube, and its weight stays on the axis.
         of("airframe.gimbal.pivot_station_m", &mut airframe.gimbal.pivot_station_m, middle_m);
         let diameter_m = body.diameter_m;
-        of(
-            "airframe.body.reference_area_m2",
-            &mut body.reference_area_m2,
-            0.25 * PI * diameter_m * diameter_m,
-        );
+        let circle_m2 = 0.25 * PI * diameter_m * diameter_m;
+        of("airframe.body.reference_area_m2", &mut body.reference_area_m2, circle_m2);
         of("airframe.fins.width_m", &mut fins.width_m, 0.25 * PI * diameter_m - CUT_M);
         let share = fins.length_m * fins.width_m / body.reference_area_m2;
         of("airframe.fins.drag_coefficient", &mut fins.drag_coefficient, FIN_DRAG * share);

@@ -21,7 +21,6 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
 use self::controller::Formulas;
-pub(super) use self::validate::BadValue;
 use super::file_error::FileError;
 use super::motors::{self, MotorError};
 
@@ -99,8 +98,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     }
     validate::vehicle(&mission).map_err(bad_value)?;
     if let Some(lot) = &mission.lot {
-        lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg)
-            .map_err(|bad| bad_value(bad.into()))?;
+        lot.validate_weights(curve.total_mass_kg(), mission.airframe.mass.loaded_kg).map_err(bad_value)?;
     }
     mission.expect(curve);
     validate::room_to_swing(&mission).map_err(bad_value)?;

@@ -1,31 +1,14 @@
 //! Range checks of a parsed mission.
 
-use alloc::borrow::ToOwned as _;
 use alloc::format;
-use alloc::string::{String, ToString as _};
 
 use toml::Value;
 
-use crate::vehicle::airframe::BadValue as BadAirframe;
+use crate::vehicle::airframe::BadValue;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::launch::Launch;
 use crate::vehicle::mission::Mission;
-
-/// A value outside its range.
-pub(in crate::vehicles) struct BadValue {
-    /// The key, with its section.
-    pub(in crate::vehicles) key: String,
-    pub(in crate::vehicles) found: String,
-    /// The accepted range, in words.
-    pub(in crate::vehicles) required: &'static str,
-}
-
-impl From<BadAirframe> for BadValue {
-    fn from(bad: BadAirframe) -> Self {
-        Self { key: bad.key.to_owned(), found: bad.found.to_string(), required: bad.required }
-    }
-}
 
 type Check = Result<(), BadValue>;
 
@@ -106,14 +89,11 @@ const RANGES: [Range; 41] = [
 /// The vehicle and its start, from which the controller is derived.
 pub(super) fn vehicle(mission: &Mission) -> Check {
     if mission.name.trim().is_empty() {
-        return Err(BadValue { key: "name".to_owned(), found: "\"\"".to_owned(), required: "a name" });
+        return Err(BadValue::new("name", &"\"\"", "a name"));
     }
-    mission
-        .airframe
-        .validate()
-        .map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad.into() })?;
+    mission.airframe.validate().map_err(|bad| BadValue { key: format!("airframe.{}", bad.key), ..bad })?;
     numbers(mission, &|key| ["lot.", "launch.", "drop."].iter().any(|section| key.starts_with(section)))?;
-    Ok(mission.launch.as_ref().map_or(Ok(()), Launch::validate)?)
+    mission.launch.as_ref().map_or(Ok(()), Launch::validate)
 }
 
 /// The motor does not touch the tube before the gimbal meets its stop.
@@ -126,16 +106,12 @@ pub(super) fn room_to_swing(mission: &Mission) -> Check {
     let motor = mission.motor_curve.name();
     let found = format!("{}, and {motor} touches the tube at {:.1}", gimbal.limit_deg, free_rad.to_degrees());
     let required = "an angle that gimbal.pivot_station_m and gimbal.inside_diameter_m leave free";
-    Err(BadValue { key: "gimbal.limit_deg".to_owned(), found, required })
+    Err(BadValue::new("gimbal.limit_deg", &found, required))
 }
 
 /// All numbers of the mission that `looked_at` names, each in its range.
 pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Check {
-    let bad_text = |error: toml::ser::Error| BadValue {
-        key: "mission".to_owned(),
-        found: error.to_string(),
-        required: "values that a file can hold",
-    };
+    let bad_text = |error: toml::ser::Error| BadValue::new("mission", &error, "values that a file can hold");
     let table = Value::try_from(mission).map_err(bad_text)?;
     each_number("", &table, &mut |key, found| {
         let range = RANGES.iter().find_map(|(required, least, most, keys)| {
@@ -145,7 +121,7 @@ pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Ch
         });
         match range {
             Some((required, range)) if looked_at(key) && !range.contains(&found) => {
-                Err(BadValue { key: key.to_owned(), found: found.to_string(), required })
+                Err(BadValue::new(key, &found, required))
             }
             _ => Ok(()),
         }
@@ -158,11 +134,7 @@ pub(super) fn numbers(mission: &Mission, looked_at: &dyn Fn(&str) -> bool) -> Ch
     ] {
         if looked_at(key) && least > most {
             let found = format!("[{least}, {most}]");
-            return Err(BadValue {
-                key: key.to_owned(),
-                found,
-                required: "two numbers, the smaller one first",
-            });
+            return Err(BadValue::new(key, &found, "two numbers, the smaller one first"));
         }
     }
     Ok(())

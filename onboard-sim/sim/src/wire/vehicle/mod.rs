@@ -74,7 +74,7 @@ impl Vehicle {
             sortie: Sortie::on_the_pad(&flight.recipe, flight.number)?,
             findings: Findings::default(),
             flown: false,
-            outside: Outside { pin_out: false, log: LogState::NONE, ..Outside::NOBODY },
+            outside: Outside { pin_out: false, log: LogState::default(), ..Outside::NOBODY },
             operators: Vec::new(),
             mission: MissionName::default(),
             ground: GroundWatch::default(),

@@ -377,7 +377,7 @@ fn a_million_random_requests_move_nothing_but_by_the_rule() {
             assert!(new_by.role == old_by.role || new_by.role == Role::RangeSafety);
         }
         if let Some(end_s) = mode.countdown_end_s {
-            let tapping = crew_after.tapping().expect("somebody taps");
+            let tapping = crew_after.tapping.expect("somebody taps");
             let commander = commander.expect("somebody commands");
             assert_ne!(tapping.by.number, commander.by.unwrap().number, "one person does the work of two");
             if end_s - now_s > LAST_HOLD_S {

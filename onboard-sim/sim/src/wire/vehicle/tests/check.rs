@@ -15,12 +15,12 @@ fn on_the_pad(dispersion: &str, faults: &[&str]) -> Rocket {
 }
 
 fn failing(rocket: &Vehicle) -> Vec<Item> {
-    let findings = rocket.computer().pad_check().findings().iter();
+    let findings = rocket.computer().pad_check().findings.iter();
     findings.filter(|found| found.verdict == Verdict::NotOk).map(|found| found.item).collect()
 }
 
 fn state(rocket: &Vehicle) -> CheckState {
-    rocket.computer().pad_check().state()
+    rocket.computer().pad_check().state
 }
 
 /// Asks for a check and waits for its end.
@@ -44,7 +44,7 @@ fn every_built_in_mission_passes_its_check() {
             let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
             rocket.run_until(|rocket| rocket.phase() == Phase::PadIdle);
             let events = checked(&mut rocket);
-            let findings = rocket.computer().pad_check().findings();
+            let findings = &rocket.computer().pad_check().findings;
             assert_eq!(state(&rocket), CheckState::Passed, "{name}, {dispersion}: {findings:#?}");
             assert!(has_text(&events, "check of the vehicle begins: gimbal and fins MOVE"));
             assert!(has_text(&events, "check passed: 3"), "{events:?}");
@@ -148,7 +148,7 @@ fn without_feedback_two_people_see_every_wrong_wiring_and_nobody_arms_before() {
     assert_eq!(seen_motions(&mut rocket), motions_of_the_page());
     assert_eq!(state(&rocket), CheckState::Passed);
     let shown = |item| {
-        rocket.computer().pad_check().findings().iter().find(|found| found.item == item).unwrap().verdict
+        rocket.computer().pad_check().findings.iter().find(|found| found.item == item).unwrap().verdict
     };
     assert_eq!((shown(Item::Range(0)), shown(Item::Lag(5))), (Verdict::NotJudged, Verdict::NotJudged));
     assert_eq!(rocket.request(CrewCommand::Seen).ending, Ending::Accepted);
@@ -218,7 +218,7 @@ fn without_motion_everything_but_the_surfaces_is_checked() {
     assert_eq!(state(&rocket), CheckState::Passed);
     // Eight of the sensors, five of switches, battery and log: mk2 starts at apogee, without a
     // booster's wire.
-    assert_eq!(rocket.computer().pad_check().findings().len(), 13);
+    assert_eq!(rocket.computer().pad_check().findings.len(), 13);
 }
 
 #[test]
