@@ -75,16 +75,16 @@ const LINES: [&str; 20] = [
     "ground status",
     "ground stop",
     "ground --replay",
-    "onboard-sim fly --mavlink udpout",
-    "onboard-sim fly --mavlink serial",
+    "onboard-sim fly --start pad --mavlink udpout",
+    "onboard-sim fly --start pad --mavlink serial",
     "ground --connect udpin",
     "ground --connect serial",
     "onboard-sim keygen flight.key",
-    "onboard-sim fly --key",
+    "onboard-sim fly --start pad --key",
     "ground --key flight.key --connect",
     "ground download",
     "replay verify vehicle1-flight.mcap",
-    "onboard-sim fly --mission mk3 --key",
+    "onboard-sim fly --start pad --mission mk3 --key",
     "ground --key flight.key --crew crew.toml --operator Ann",
     "ground --key flight.key --crew crew.toml --operator Bob",
     "replay verify --book ground.mcap vehicle.mcap",
@@ -107,7 +107,7 @@ fn a_station_of_the_crews_page_has_screens() {
     let folder = folder.path();
     let mut station = Running::start(&mut places.command(folder, "ground daemon --connect"));
     station.wait_for_line("type next: ground attach");
-    let flown = Running::start(&mut places.command(folder, "onboard-sim fly --mavlink udpout"));
+    let flown = Running::start(&mut places.command(folder, "onboard-sim fly --start pad --mavlink udpout"));
     let attached = places.screen(folder, "ground attach", READY);
     let watching = places.screen(folder, "ground attach --watch", "WATCH");
     places.answer(folder, "ground status", "PAD_IDLE disarmed");
@@ -134,9 +134,9 @@ fn a_recorded_flight_is_shown_as_the_crews_page_says() {
 #[test]
 fn the_links_of_the_crews_page_join_vehicle_and_station() {
     for (begins, meets) in [
-        ("onboard-sim fly --mavlink udpout", "ground --connect udpin"),
-        ("onboard-sim fly --mavlink serial", "ground --connect serial"),
-        ("onboard-sim fly --key", "ground --key flight.key --connect"),
+        ("onboard-sim fly --start pad --mavlink udpout", "ground --connect udpin"),
+        ("onboard-sim fly --start pad --mavlink serial", "ground --connect serial"),
+        ("onboard-sim fly --start pad --key", "ground --key flight.key --connect"),
     ] {
         let (folder, places) = (tempfile::tempdir().unwrap(), Places::new());
         places.answer(folder.path(), "onboard-sim keygen flight.key", "");
@@ -177,7 +177,8 @@ fn the_two_people_of_the_crews_page_see_a_vehicle_that_is_ready() {
         keygen(folder.path(), key);
     }
     fs::write(folder.path().join("crew.toml"), crew_file()).unwrap();
-    let _vehicle = Running::start(&mut places.command(folder.path(), "onboard-sim fly --mission mk3 --key"));
+    let _vehicle =
+        Running::start(&mut places.command(folder.path(), "onboard-sim fly --start pad --mission mk3 --key"));
     for operator in ["Ann", "Bob"] {
         // Each laptop remembers its own time stamps.
         let laptop = folder.path().join(operator);

@@ -133,7 +133,7 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
     agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
     let released = (0..60).any(|_| {
         launch.bob.type_bytes(b"T");
-        let flies = |window: &e2e::Window| window.shows(" Landing ").then_some(());
+        let flies = |window: &e2e::Window| window.shows(" AERO_DESCENT ").then_some(());
         launch.ann.wait_within(TAP_EVERY, flies).is_some()
     });
     assert!(released, "{}", launch.ann.window().rows().join("\n"));

@@ -81,9 +81,9 @@ fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_re
     let mut rig = Rig::new("mk2");
     rig.arm();
     rig.start();
-    rig.terminal.wait_for(" Landing ");
+    rig.terminal.wait_for(" AERO_DESCENT ");
     rig.proxy.impair(Impairment { drops_all: true, ..Impairment::default() });
-    rig.terminal.wait_for("~Landing");
+    rig.terminal.wait_for("~AERO_DESCENT");
     rig.terminal.wait_for("~ARMED");
     rig.terminal.wait_for("LINK LOST");
     rig.terminal.wait_for(" PREDICTED ");

@@ -171,12 +171,18 @@ fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, check
 /// vehicle that nobody commands.
 const ALONE_S: f64 = 60.0;
 
+/// Time after a disarm in which only the station that disarmed may arm, s: two operators may have
+/// typed at once, and whoever disarmed may have sent somebody to the vehicle.
+const DISARMED_S: f64 = 3.0;
+
 /// State of the crew in the computer's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct CrewMemory {
     pub two_person: TwoPerson,
     /// The operator who held the last countdown, or whose silence held it.
     pub held_by: Option<Operator>,
+    /// When the last disarm was received, s, and from which station.
+    disarmed: Option<(f64, Station)>,
 }
 
 /// A proposal and the operator who confirmed it.
@@ -198,10 +204,11 @@ impl Computer {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
             return Answer { ending: Ending::NotNow, ..self.deny(command, reason.into()) };
         }
-        if command == CrewCommand::Start
-            && let Some(reason) = self.why_not_start(request)
-        {
+        if let Some(reason) = self.why_not_here(request) {
             return self.deny(command, reason);
+        }
+        if let (CrewCommand::Disarm, Some(station)) = (command, station) {
+            self.crew.disarmed = Some((time_s, station));
         }
         if is_so_already(&mode, command) {
             return Answer::ACCEPTED;
@@ -271,11 +278,18 @@ impl Computer {
         }
     }
 
-    /// Why the countdown cannot be started from this station; `None` if it can. With one person,
-    /// the station that armed must start, because its silence holds the countdown. With two, one
-    /// gives dead-man confirmations, and they may start from any two stations.
-    fn why_not_start(&self, request: &Request) -> Option<String> {
-        let station = request.station.filter(|_| !matches!(self.input.people, Some(People::Two { .. })));
+    /// Why this station may not arm or start now; `None` if it may. With one person, the station
+    /// that armed must start, because its silence holds the countdown. With two, one gives dead-man
+    /// confirmations, and they may start from any two stations.
+    fn why_not_here(&self, request: &Request) -> Option<String> {
+        let station = request.station?;
+        if request.command == CrewCommand::Arm {
+            let (disarmed_s, by) = self.crew.disarmed.filter(|(_, by)| *by != station)?;
+            let recent = self.table.time_s - disarmed_s < DISARMED_S;
+            return recent.then(|| format!("{by} has just disarmed it: agree, then arm again"));
+        }
+        let one_person = !matches!(self.input.people, Some(People::Two { .. }));
+        let station = Some(station).filter(|_| one_person && request.command == CrewCommand::Start);
         let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed);
         if let (Some(station), Some(Commander { station: armed_by, by, .. })) = (station, armed_by)
             && armed_by != station

@@ -229,6 +229,23 @@ fn only_the_station_that_armed_it_starts_or_the_one_that_has_taken_command() {
     assert!(!pad.counting(), "the one who started is watched");
 }
 
+/// Two operators may type at once: a disarm is not undone by an arming that another station sent
+/// at the same time.
+#[test]
+fn no_other_station_arms_in_the_three_seconds_after_a_disarm() {
+    let mut pad = Pad::rocket();
+    pad.speaking = vec![CREW, OTHER];
+    pad.run(0.5);
+    assert_eq!(pad.request(OTHER, ARM, 0.0), ACCEPTED, "a disarm of a disarmed vehicle");
+    assert_eq!(pad.request(CREW, ARM, 1.0), DENIED);
+    let words = "arm refused: 254/190 has just disarmed it: agree, then arm again";
+    assert_eq!((pad.message_count(words), pad.vehicle.phase()), (1, Phase::PadIdle));
+    assert_eq!(pad.request(OTHER, ARM, 1.0), ACCEPTED, "the station that disarmed");
+    assert_eq!(pad.request(OTHER, ARM, 0.0), ACCEPTED);
+    pad.run(3.1);
+    assert_eq!((pad.request(CREW, ARM, 1.0), pad.vehicle.phase()), (ACCEPTED, Phase::PadArmed));
+}
+
 #[test]
 fn a_running_check_can_be_cancelled() {
     let mut pad = Pad::rocket();
