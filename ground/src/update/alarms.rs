@@ -271,9 +271,13 @@ fn battery(model: &Model) -> Option<String> {
     (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
 }
 
-/// A position without satellites drifts. On the pad it is a failing check.
+/// A position without satellites drifts. On the pad it is a failing check. On the way up it is
+/// normal: no receiver holds its fix in a boost, and some need seconds to find it again.
 fn position(model: &Model) -> Option<String> {
     model.vehicle.left_pad_at?;
+    if matches!(model.vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST)) {
+        return None;
+    }
     let is_unknown = |Sample { value, .. }: Sample<ESTIMATOR_STATUS_DATA>| {
         !value.flags.contains(EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS)
     };

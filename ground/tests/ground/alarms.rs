@@ -83,9 +83,9 @@ fn a_log_of_the_vehicle_that_stops_in_flight_is_an_alarm_that_stays() {
     assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded whole"));
 }
 
-/// On the pad it is a failing check.
+/// On the pad it is a failing check, and on the way up no receiver holds its fix.
 #[test]
-fn a_loss_of_gnss_after_lift_off_is_an_alarm_on_every_page() {
+fn a_loss_of_gnss_from_apogee_on_is_an_alarm_on_every_page() {
     let gnss = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS;
     let absolute = EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS;
     let loss = |rig: &mut Rig, health, flags| {
@@ -112,7 +112,9 @@ fn a_loss_of_gnss_after_lift_off_is_an_alarm_on_every_page() {
         (rig.phase, rig.armed) = (TdPhase::TD_PHASE_COAST, true);
         loss(&mut rig, gnss, absolute);
         rig.run(1.0);
-        assert!(!rig.model.alarms.is_unseen(AlarmKind::Position));
+        loss(&mut rig, health, flags);
+        assert!(!rig.model.alarms.is_unseen(AlarmKind::Position), "on the way up");
+        rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
         loss(&mut rig, health, flags);
         for page in "123456789?".chars() {
             rig.key(Key::Char(page));
