@@ -414,7 +414,8 @@ fn random_signed_frames_arm_nothing_without_two_keys() {
     let mut launch = Launch::two();
     let mut recorded: Vec<Frame> = Vec::new();
     let (mut armed, mut sent) = (0, 0);
-    for _ in 0..20_000 {
+    // The station that disarms it keeps the others from arming for three seconds.
+    for _ in 0..40_000 {
         let dice = random.next_u32();
         let waits = launch.vehicle.computer().crew().two_person.waiting(launch.vehicle.time_s());
         let mut confirmed_by = None;
