@@ -84,7 +84,7 @@ fn abort(root: &Path) -> Result<(), Failure> {
             .filter(|facts| facts.contains("acknowledged accepted  observed yes"))
     };
     terminal.wait_within(FLIGHT_LIMIT, seen).ok_or_else(|| missing(&terminal, "an abort that was seen"))?;
-    wait(&terminal, "Parachute")?;
+    wait(&terminal, " CHUTE ")?;
     wait(&terminal, "TOUCHDOWN")?;
     let report = end(&mut terminal, Exit::RefusedOrAborted)?;
     expect(&report, "ABORTED")?;

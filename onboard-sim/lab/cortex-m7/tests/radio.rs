@@ -87,7 +87,7 @@ fn an_abort_from_the_screen_opens_the_parachute_of_a_board() {
     });
     assert!(flown, "{}", screen.window().rows().join("\n"));
     screen.type_bytes(b"\x18\r");
-    screen.wait_for("Parachute");
+    screen.wait_for(" CHUTE ");
     screen.wait_for("TOUCHDOWN");
     let world = chain.wait();
     assert_eq!(world.code, Some(4), "{}", world.output);
