@@ -149,10 +149,10 @@ pub fn print_error(text: &str) {
     let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
 }
 
-/// The file of a command that writes a log from it, and the log.
+/// An input file, and the log to write from it.
 #[derive(Debug, clap::Args)]
 pub(crate) struct FromTo {
-    /// The file to read.
+    /// The file to read: for import .ulg, .bin or .csv, for recover a damaged log.
     file: PathBuf,
     /// The log to write.
     output: PathBuf,

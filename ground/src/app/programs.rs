@@ -117,9 +117,15 @@ mod voice_tests {
             assert!(voice.say(line));
         }
         drop(voice);
-        while std::fs::read_to_string(&heard).unwrap_or_default() != "liftoff\n$(reboot); `x` | y\n" {
+        let written = || std::fs::read_to_string(&heard).unwrap_or_default();
+        // The command writes when it is scheduled: this bound is some ten seconds.
+        for _ in 0..1_000_000 {
+            if written().lines().count() == 2 {
+                break;
+            }
             std::thread::yield_now();
         }
+        assert_eq!(written(), "liftoff\n$(reboot); `x` | y\n");
     }
 
     /// More than a pipe holds; a call that waited would never return.

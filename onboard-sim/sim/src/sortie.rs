@@ -522,15 +522,16 @@ impl Sortie {
     }
 
     /// Normalised estimation error squared of the motor's impulse scale and burn time
-    /// ([`nees_of_scales`][scales]); `None` before the motor has ignited. The accelerometer cannot
-    /// distinguish more impulse from less mass.
+    /// ([`nees_of_scales`][scales]); `None` before the motor has ignited, and for a motor
+    /// of another curve than expected. The accelerometer cannot distinguish more impulse from less
+    /// mass.
     ///
     /// [scales]: flight::estimation::motor_estimate::MotorEstimate::nees_of_scales
     pub fn nees_of_motor(&self) -> Option<f64> {
         self.measured().filter(|_| !self.dead)?;
         let motor = self.pilot().motor();
-        motor.ignition_s()?;
         let truth = self.world().truth();
+        motor.ignition_s().filter(|_| truth.other_curve == 0.0)?;
         motor.nees_of_scales(truth.impulse_scale / truth.mass_scale, truth.burn_time_scale)
     }
 

@@ -258,9 +258,8 @@ impl TableReader {
         let key = (frame.source(), frame.message_id());
         let table = match self.messages.get(&key) {
             Some(table) => *table,
-            None => place_of(&mut self.shapes, shape_of_frame(&frame)?),
+            None => *self.messages.entry(key).or_insert(place_of(&mut self.shapes, shape_of_frame(&frame)?)),
         };
-        self.messages.insert(key, table);
         let fact = |key: &str| channel.metadata.get(key).map_or("", String::as_str);
         let direction = if channel.topic == TOPIC_RAW_RX { "rx" } else { "tx" };
         let cells = cells_of_frame(&frame, [fact("endpoint"), direction, fact("link")]);

@@ -49,9 +49,8 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let lit_s = lit.map(|(_, at)| seconds_since(*at, from));
     // The burn fills the picture: what was flown before it tells nothing about its end.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
-    let begins_s =
-        lit_s.filter(|_| burns).map_or(if burns { present_s } else { 0.0 }, |lit_s| lit_s.min(present_s));
-    let begins_s = if burns { (begins_s - 1.0).floor().max(0.0) } else { 0.0 };
+    let ignited_s = lit_s.map_or(present_s, |lit_s| lit_s.min(present_s));
+    let begins_s = if burns { (ignited_s - 1.0).floor().max(0.0) } else { 0.0 };
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
     let flown: Vec<(f64, f64)> = flown.filter(|(at, _)| *at >= begins_s).collect();

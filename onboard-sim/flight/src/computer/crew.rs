@@ -283,21 +283,21 @@ impl Computer {
     /// confirmations, and they may start from any two stations.
     fn why_not_here(&self, request: &Request) -> Option<String> {
         let station = request.station?;
-        if request.command == CrewCommand::Arm {
-            let (disarmed_s, by) = self.crew.disarmed.filter(|(_, by)| *by != station)?;
-            let recent = self.table.time_s - disarmed_s < DISARMED_S;
-            return recent.then(|| format!("{by} has just disarmed it: agree, then arm again"));
+        match request.command {
+            CrewCommand::Arm => {
+                let (disarmed_s, by) = self.crew.disarmed?;
+                (by != station && self.table.time_s - disarmed_s < DISARMED_S)
+                    .then(|| format!("{by} has just disarmed it: agree, then arm again"))
+            }
+            CrewCommand::Start if !matches!(self.input.people, Some(People::Two { .. })) => {
+                let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed)?;
+                (armed_by.station != station).then(|| {
+                    let who = named(armed_by.station, armed_by.by);
+                    format!("{who} armed it: start there, or take command when it is silent")
+                })
+            }
+            _ => None,
         }
-        let one_person = !matches!(self.input.people, Some(People::Two { .. }));
-        let station = Some(station).filter(|_| one_person && request.command == CrewCommand::Start);
-        let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed);
-        if let (Some(station), Some(Commander { station: armed_by, by, .. })) = (station, armed_by)
-            && armed_by != station
-        {
-            let who = named(armed_by, by);
-            return Some(format!("{who} armed it: start there, or take command when it is silent"));
-        }
-        None
     }
 
     /// Proposes or confirms, if two people must agree. A new proposal and a wrong confirmation

@@ -43,7 +43,8 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
         scenario_toml: Some(recipe.dispersion_toml.clone()),
     }
 }
-/// Keeps the flight computer's last frame as its record.
+
+/// Stores the flight computer's last frame as its record.
 #[derive(Debug, Clone, Default)]
 pub struct LastFrame {
     /// `None` while the computer is dead.

@@ -129,7 +129,7 @@ impl Truth {
         if share == 0.0 {
             return Ok(Cow::Borrowed(&mission.motor_curve));
         }
-        let Some(other) = mission.other_curves.first() else {
+        let Some(other) = mission.other_curves.last() else {
             return refuse("0 (the mission has no other_motors)");
         };
         if !(0.0..=1.0).contains(&share) {

@@ -453,7 +453,7 @@ impl Session {
         self.client == client && self.number == number
     }
 
-    /// Takes a request to read. Returns why one behind the end of the file is refused.
+    /// Takes a request to read. Returns the refusal of one that begins behind the end of the file.
     fn queue(&mut self, request: &Packet) -> Option<Refusal> {
         let is_burst = request.opcode == Opcode::BURST_READ_FILE;
         if request.offset >= self.len {

@@ -65,14 +65,14 @@ impl VehicleEndpoint {
                 return refused(denied, format!("for boot {boot}; this is boot {us}"));
             }
             AddressedBoot::Unreadable => {
-                return refused(denied, "parameter 7 is no boot number (0 for any boot)".to_owned());
+                return refused(denied, format!("parameter 7 is no boot number: name boot {us}"));
             }
             AddressedBoot::Any if self.has_twin(vehicle.time_s) => {
                 let why = "another vehicle has these ids: name the boot that it is for in parameter 7";
                 return refused(not_now, why.to_owned());
             }
             // A program that names no boot has not received this vehicle's status. Other ground
-            // stations fly a simulated vehicle without one, unless a Touchdown station commands it.
+            // stations fly a simulated vehicle without one until it receives a Touchdown station.
             AddressedBoot::Any
                 if self.identity.kind == VehicleKind::Real || self.stations.has_received_touchdown() =>
             {

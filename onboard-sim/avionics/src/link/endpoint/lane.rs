@@ -128,13 +128,13 @@ impl Lane {
 
     /// Takes a radio's report about its buffer.
     pub(super) fn on_radio(&mut self, free_percent: u8, now_s: f64) {
-        self.radio.on_report(free_percent, Duration::from_secs_f64(now_s));
+        self.radio.on_report(free_percent, Duration::try_from_secs_f64(now_s).unwrap_or_default());
         self.share_with_the_radio(now_s);
     }
 
     /// Uses the share of the budget that the radio reports as free.
     fn share_with_the_radio(&mut self, now_s: f64) {
-        let share = self.radio.at(Duration::from_secs_f64(now_s));
+        let share = self.radio.at(Duration::try_from_secs_f64(now_s).unwrap_or_default());
         let capacity_bytes_s = (share * f64::from(self.granted_bytes_s)) as u32;
         self.streams.set_capacity(capacity_bytes_s);
         // The reserve of a slow line is the unused part of its baud rate.

@@ -1,7 +1,7 @@
 //! The pilot: flies a rocket from its release to touchdown, one frame in, one set of commands out.
 //!
 //! It is part of the [flight computer](crate::computer) and deterministic like it. A frame is 5 ms:
-//! estimate, identify the motor, change phases, point fins and gimbal. Every tenth frame requests
+//! estimate state and motor, change phases, point fins and gimbal. Every tenth frame requests
 //! the prediction, or a plan of the landing, from the [`planner`].
 
 mod ascent;
