@@ -7,8 +7,9 @@
 use std::time::Duration;
 
 use protocol::dialect::TdRole;
-use protocol::mission::MissionHash;
+use protocol::text::shown;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use super::{
     FlownMission, Model,
@@ -27,7 +28,8 @@ pub struct Checklist {
     pub name: String,
     /// The name of the only mission that it is for, as the vehicle tells it; `None` for any.
     pub mission: Option<String>,
-    /// The hash of its text, as of a mission's. Signatures count for this text only.
+    /// The first eight bytes of the SHA-256 of its text, as hexadecimal digits. Signatures count for
+    /// this text only.
     pub hash: String,
     pub steps: Vec<Step>,
 }
@@ -305,7 +307,7 @@ pub fn parse_checklist(text: &str) -> anyhow::Result<Checklist> {
     Ok(Checklist {
         name: words::printable(&written.name, WORDS_MAX),
         mission: written.mission,
-        hash: MissionHash::of(text).to_string(),
+        hash: shown(&Sha256::digest(text)[..8]).replace('-', ""),
         steps,
     })
 }
