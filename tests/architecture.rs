@@ -17,20 +17,28 @@ fn page() -> String {
     read(&root().join("ARCHITECTURE.md"))
 }
 
-/// Folders of the members, by their package's name.
+/// The two workspaces: the product's, and the lab's.
+const WORKSPACES: [&str; 2] = ["", "onboard-sim/lab"];
+
+/// A TOML file of the project.
+fn toml(path: &Path) -> toml::Table {
+    read(path).parse().unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Folders of the members of both workspaces, by package name.
 fn members() -> BTreeMap<String, String> {
-    let manifest = read(&root().join("Cargo.toml"));
-    let list = manifest.split("members = [").nth(1).expect("a list of members");
-    let folders =
-        list.split(']').next().expect("its end").split(',').map(|entry| entry.trim().trim_matches('"'));
-    folders
-        .filter(|folder| !folder.is_empty())
-        .map(|folder| {
-            let manifest = read(&root().join(folder).join("Cargo.toml"));
-            let name = manifest.lines().find_map(|line| line.strip_prefix("name = ")).expect("a name");
-            (name.trim_matches('"').to_owned(), folder.to_owned())
-        })
-        .collect()
+    let mut members = BTreeMap::new();
+    for workspace in WORKSPACES.map(|folder| root().join(folder)) {
+        let manifest = toml(&workspace.join("Cargo.toml"));
+        for member in manifest["workspace"]["members"].as_array().expect("a list of members") {
+            let folder = workspace.join(member.as_str().expect("a folder")).canonicalize().expect("a folder");
+            let package = toml(&folder.join("Cargo.toml"));
+            let name = package["package"]["name"].as_str().expect("a name").to_owned();
+            let relative = folder.strip_prefix(root()).expect("a folder of the project");
+            members.insert(name, relative.to_str().expect("a path in UTF-8").to_owned());
+        }
+    }
+    members
 }
 
 /// The members that a member needs to be built: its dependencies, not those of its tests.
@@ -80,6 +88,44 @@ fn the_arrows_are_those_of_the_manifests() {
         assert_eq!(drawn.get(name), Some(needs), "{name}");
     }
     assert_eq!(drawn.len(), found.len(), "{drawn:?}");
+}
+
+/// Cargo shares neither versions, lints nor profiles between workspaces. With other versions the
+/// lab would measure another flight computer.
+#[test]
+fn the_lab_is_built_as_the_product_is() {
+    let [product, lab] = WORKSPACES.map(|folder| toml(&root().join(folder).join("Cargo.toml")));
+    for table in ["package", "lints"] {
+        assert_eq!(lab["workspace"][table], product["workspace"][table], "[workspace.{table}]");
+    }
+    let version = |dependency: &toml::Value| dependency.get("version").unwrap_or(dependency).clone();
+    let [versions, of_lab] = [&product, &lab].map(|manifest| &manifest["workspace"]["dependencies"]);
+    for (name, dependency) in of_lab.as_table().expect("a table") {
+        if let Some(same) = versions.get(name).filter(|same| same.get("path").is_none()) {
+            assert_eq!(version(dependency), version(same), "version of {name}");
+        }
+    }
+    let packages = |profile: &toml::Value| profile["package"].as_table().expect("packages").clone();
+    for profile in ["dev", "release"] {
+        let of_lab = packages(&lab["profile"][profile]);
+        for (name, settings) in packages(&product["profile"][profile]) {
+            assert_eq!(of_lab.get(&name), Some(&settings), "profile {profile}, package {name}");
+        }
+    }
+    let locked = |folder: &str| -> BTreeSet<(String, String)> {
+        let lock = toml(&root().join(folder).join("Cargo.lock"));
+        let text = |package: &toml::Value, key: &str| package[key].as_str().expect("a text").to_owned();
+        let packages = lock["package"].as_array().expect("a list of packages");
+        packages.iter().map(|package| (text(package, "name"), text(package, "version"))).collect()
+    };
+    let [product, lab] = WORKSPACES.map(locked);
+    let names: BTreeSet<&String> = product.iter().map(|(name, _)| name).collect();
+    let others: Vec<_> = product
+        .iter()
+        .filter(|entry| !lab.contains(*entry) && lab.iter().any(|(name, _)| *name == entry.0))
+        .collect();
+    assert!(names.len() > 100, "{}", names.len());
+    assert_eq!(others, Vec::<&(String, String)>::new(), "versions that the lab does not have");
 }
 
 /// A library's page must name its public modules, so that a newcomer finds the code.

@@ -40,7 +40,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
     ),
     (
         "docs/engineer.md",
-        "cargo build --release -p replay-rerun",
+        "cargo install --path replay/rerun-export",
         "compiles for ten minutes; .ci/run exports a log to Rerun",
     ),
     ("docs/engineer.md", "replay-rerun ", "needs the line above"),

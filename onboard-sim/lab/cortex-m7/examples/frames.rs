@@ -1,7 +1,7 @@
 //! Writes a recorded flight as the stream that a board reads (the file `frames` of a folder), and
 //! its recorded decisions as the answers to be expected (`recorded`).
 //!
-//! `cargo run --release -p board --example frames -- LOG FOLDER`
+//! `cargo run --release -p board --example frames -- LOG FOLDER` in `onboard-sim/lab`
 
 use std::path::PathBuf;
 

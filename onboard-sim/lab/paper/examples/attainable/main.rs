@@ -29,6 +29,7 @@
 //! fall is possible.
 //!
 //! ```text
+//! cd onboard-sim/lab
 //! cargo run --release -p paper --example attainable -- --mission mk2 --dispersion real \
 //!     --seed 2002 --flights 100
 //! ```
