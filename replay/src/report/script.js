@@ -63,7 +63,7 @@
   let now = 0, playing = 0;
   const bar = document.createElement("div");
   bar.className = "time";
-  bar.innerHTML = `<button type="button">play</button><input type="range" step="0.01" min="${first}" max="${last}" aria-label="time"/><output></output><small>Drag in any picture over time. Shift and drag: closer; double click: all.</small>`;
+  bar.innerHTML = `<button type="button">play</button><input type="range" step="0.01" min="${first}" max="${last}" aria-label="time"/><output></output><small>Drag in a picture, or arrow keys. Zoom: shift and drag, + and \u2212, 0 for all. Click a name to hide its line.</small>`;
   const [button, range, output] = bar.children;
   const to = (time) => {
     now = Math.min(last, Math.max(first, time));
@@ -73,19 +73,26 @@
     output.textContent = `T+${now.toFixed(2)} s` + (phase ? ` ${phase[0]}` : "") + (at ? `, ${short(at[3])} m` : "");
     draw(at);
   };
+  // The address names the time, so that it can be sent to somebody: `report.html#t=14.70`.
+  const remember = () => { try { history.replaceState(null, "", `#t=${now.toFixed(2)}`); } catch { /* a page in a frame has no address */ } };
+  const named = () => { const [, time] = /^#t=(-?[\d.]+)$/.exec(location.hash) || []; return time === undefined ? NaN : Number(time); };
   const stop = () => { cancelAnimationFrame(playing); playing = 0; button.textContent = "play"; };
-  button.addEventListener("click", () => {
-    if (playing) { stop(); return; }
+  const play = () => {
+    if (playing) { stop(); remember(); return; }
     let before = performance.now();
     if (now >= last - 0.01) to(first);
     button.textContent = "pause";
     const step = (time) => { to(now + (time - before) / 1e3); before = time; if (now < last) playing = requestAnimationFrame(step); else stop(); };
     playing = requestAnimationFrame(step);
-  });
+  };
+  button.addEventListener("click", play);
   range.addEventListener("input", () => { stop(); to(Number(range.value)); });
+  range.addEventListener("change", remember);
+  addEventListener("hashchange", () => { if (isFinite(named())) { stop(); to(named()); } });
 
   // A part of the time in all pictures over time.
-  const zoom = (span) => figures.filter((f) => f.over).forEach((f) => {
+  let seen = null;
+  const zoom = (span) => { seen = span; figures.filter((f) => f.over).forEach((f) => {
     f.seen = span && span[1] > f.x[0] && span[0] < f.x[1] ? span : null;
     const [from, until] = f.seen || f.x, unit = f.wide / (f.x[1] - f.x[0]);
     f.plot.setAttribute("viewBox", `${(from - f.x[0]) * unit} 0 ${(until - from) * unit} ${f.high}`);
@@ -100,7 +107,7 @@
       const end = made(f.plot.parentNode, "text", { class: anchor, x, y: f.high / 10 + 14 });
       end.textContent = time.toFixed(2); return end;
     }) : [];
-  });
+  }); };
   figures.filter((f) => f.over).forEach((f) => {
     const target = made(f.plot.parentNode, "rect", { class: "target", width: f.wide / 10, height: f.high / 10 });
     const time = (event) => {
@@ -123,12 +130,42 @@
       }
     });
     target.addEventListener("pointerup", (event) => {
+      remember();
       if (!chosen) return;
       chosen.remove(); chosen = null;
       const span = [from, time(event)].sort((a, b) => a - b);
       if (span[1] - span[0] > 0.05) zoom(span);
     });
     target.addEventListener("dblclick", () => zoom(null));
+  });
+
+  // A name in a legend hides its line, and shows it again.
+  figures.forEach((f) => f.figure.querySelectorAll("figcaption span").forEach((name, k) => {
+    const line = f.plot.querySelectorAll(".l")[k];
+    if (!line) return;
+    name.tabIndex = 0; name.setAttribute("role", "switch"); name.setAttribute("aria-checked", "true");
+    const toggle = () => {
+      const hidden = name.classList.toggle("hidden");
+      line.style.display = hidden ? "none" : ""; name.setAttribute("aria-checked", String(!hidden));
+    };
+    name.addEventListener("click", toggle);
+    name.addEventListener("keydown", (event) => { if (event.key === "Enter") toggle(); });
+  }));
+
+  // Time and zoom from the keyboard. The keys that scroll a page are left to the page.
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || rows.length < 2) return;
+    const step_s = event.shiftKey ? 1 : 0.05;
+    const closer = (factor) => {
+      const half = factor * ((seen ? seen[1] - seen[0] : last - first) / 2);
+      zoom(2 * half >= last - first ? null : [now - Math.max(half, 0.05), now + Math.max(half, 0.05)]);
+    };
+    const keys = {
+      ArrowLeft: () => to(now - step_s), ArrowRight: () => to(now + step_s), p: play,
+      "+": () => closer(0.5), "=": () => closer(0.5), "-": () => closer(2), 0: () => zoom(null) };
+    if (!Object.hasOwn(keys, event.key)) return;
+    if (event.key !== "p") stop();
+    keys[event.key](); remember(); event.preventDefault();
   });
 
   // The vehicle, seen from a side that a hand may turn: from the south at first.
@@ -232,6 +269,6 @@
   if (rows.length > 1) {
     document.querySelector("main").append(bar);
     const sign = document.querySelector("circle.sign");
-    to(data.at ?? (sign ? Number(sign.dataset.t) : (first + last) / 2));
+    to(isFinite(named()) ? named() : data.at ?? (sign ? Number(sign.dataset.t) : (first + last) / 2));
   }
 })();

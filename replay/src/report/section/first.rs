@@ -3,12 +3,13 @@
 
 use flight::rules::verdict::Landing;
 use protocol::log::v1::LimitResult;
+use protocol::motion::Degrees;
 
 use crate::findings::{Finding, over};
 use crate::info::Info;
 use crate::log::{Verdict, worst_first};
 use crate::report::html::{escaped, paragraph, table};
-use crate::report::track::Flight;
+use crate::report::track::{Flight, State};
 
 use super::{Drawn, place};
 
@@ -55,12 +56,23 @@ fn verdict(flight: &Flight, info: &Info) -> String {
                 .to_owned()
         },
         |verdict| {
-            let place = flight.contact().map(|[north, east, ..]| libm::hypot(north, east));
-            let place = place.map_or_else(String::new, |place_m| format!(", {place_m:.1} m from the pad"));
-            format!("Touchdown at {}{place}.", info.clocks.words(verdict.contact()))
+            let far = |[north_m, east_m, ..]: State| {
+                format!(", {:.1} m from the pad", libm::hypot(north_m, east_m))
+            };
+            let far = flight.contact().map_or_else(String::new, far);
+            format!("Touchdown at {}{far}.", info.clocks.words(verdict.contact()))
         },
     );
-    format!("<h1 class=\"verdict{class}\">{}</h1>\n", escaped(ending)) + &paragraph(&words)
+    let position = geo_link(flight).unwrap_or_default();
+    format!("<h1 class=\"verdict{class}\">{}</h1>\n<p>{}{position}</p>\n", escaped(ending), escaped(&words))
+}
+
+/// The touchdown's position as a `geo:` URI (RFC 5870), which a telephone opens in its map.
+fn geo_link(flight: &Flight) -> Option<String> {
+    let ([north_m, east_m, ..], site) = (flight.contact()?, flight.pilot.as_ref()?.mission().site);
+    let pad = Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg };
+    let Degrees { latitude, longitude } = pad.moved(north_m, east_m);
+    Some(format!(" <a href=\"geo:{latitude:.6},{longitude:.6}\">{latitude:.6}, {longitude:.6}</a>"))
 }
 
 /// The findings, numbered as in the pictures, and below them the picture that shows the first.
@@ -84,10 +96,9 @@ fn findings(info: &Info, drawn: &[Drawn]) -> String {
         let items: String = findings.iter().map(item).collect();
         html.extend([format!("<ol class=\"findings\">\n{items}</ol>\n")]);
     }
-    // The picture of the first; the whole flight stands beside it. Of nothing wrong how it came
-    // down.
-    let shown = findings.iter().map(|finding| finding.picture).chain(["vertical-speed"]);
-    let first = shown.filter_map(of).find(|(section, ..)| *section != "first");
+    // The picture of the first finding; the complete flight is drawn beside it.
+    let shown = findings.iter().filter_map(|finding| of(finding.picture));
+    let first = shown.into_iter().find(|(section, ..)| *section != "first");
     html + &first.map_or_else(String::new, |(.., svg)| svg.replacen("<figure id=", "<figure data-of=", 1))
 }
 
