@@ -8,7 +8,7 @@ use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
-use protocol::program::{EXIT_CODES, Manual, Shown};
+use protocol::program::{EXIT_CODES, Manual, Shown, in_range};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
 use sim::wire::fly::StartPoint;
@@ -106,12 +106,12 @@ pub struct LinkArgs {
 
     /// This station's own MAVLink system id; every station on a link needs a different one.
     /// Default: 255.
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "ID", value_parser = in_range(1..=u8::MAX))]
     pub sysid: Option<u8>,
 
     /// MAVLink system id of the vehicle to show and command; other systems are ignored. Default: 1;
     /// for a replay the first vehicle in the log.
-    #[arg(long, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "ID", value_parser = in_range(1..=u8::MAX))]
     pub vehicle_sysid: Option<u8>,
 
     /// Sign every frame with this key, and accept only frames signed with it. `onboard-sim keygen`

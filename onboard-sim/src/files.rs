@@ -8,15 +8,18 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use protocol::log::recorder::{is_device, other_name, under_free_name};
+use sim::recipe::nearest;
 use tempfile::{NamedTempFile, TempPath};
 
 /// Neither a built-in text nor a file.
 #[derive(Debug, thiserror::Error)]
-#[error("'{name}' is neither a built-in {what} ({available}) nor a readable file")]
+#[error("'{name}' is neither a built-in {what} ({available}) nor a readable file{hint}")]
 pub struct UnknownText {
     name: String,
     what: &'static str,
     available: String,
+    /// The name that was probably meant, as a question.
+    hint: String,
     source: io::Error,
 }
 
@@ -30,7 +33,10 @@ pub fn text_of(name: &str, builtin: &[(&str, &str)], what: &'static str) -> Resu
     }
     std::fs::read_to_string(name).map_err(|source| {
         let available = builtin.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        UnknownText { name: name.to_owned(), what, available, source }
+        let close =
+            nearest(name, builtin.iter().map(|(name, _)| *name)).filter(|(_, likeness)| *likeness > 0.8);
+        let hint = close.map_or_else(String::new, |(close, _)| format!("; did you mean `{close}`?"));
+        UnknownText { name: name.to_owned(), what, available, hint, source }
     })
 }
 

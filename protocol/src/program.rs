@@ -1,7 +1,10 @@
 //! Common parts of the three programs: exit codes, and alternative forms of their command lines.
 
+use std::fmt::Display;
 use std::io::{self, Write as _};
+use std::ops::RangeInclusive;
 use std::process::ExitCode;
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::error::ErrorKind;
@@ -96,9 +99,33 @@ pub fn read(program: Command) -> Result<ArgMatches, clap::Error> {
     let program = program
         .mut_subcommand("completions", |its| its.after_help(format!("Example: {name} completions bash")))
         .mut_subcommand("man", |its| its.after_help(format!("Example: {name} man")));
-    let given = program.color(color).try_get_matches()?;
+    let given = with_negative_numbers(program.color(color)).try_get_matches()?;
     QUIET.store(given.get_flag("quiet"), Ordering::Relaxed);
     Ok(given)
+}
+
+/// Lets every option take a negative number, so that its error names the option and its range; an
+/// unknown option is an error as before.
+fn with_negative_numbers(mut program: Command) -> Command {
+    for command in program.get_subcommands_mut() {
+        *command = with_negative_numbers(std::mem::take(command));
+    }
+    program.mut_args(|option| {
+        let takes_value = option.get_action().takes_values() && !option.is_positional();
+        option.allow_negative_numbers(takes_value)
+    })
+}
+
+/// Returns the parser of a number in a range; its error states the range.
+pub fn in_range<N>(range: RangeInclusive<N>) -> impl Fn(&str) -> Result<N, String> + Clone
+where
+    N: FromStr + PartialOrd + Display + Clone,
+{
+    let kind = if "0.5".parse::<N>().is_ok() { "number" } else { "whole number" };
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("must be a {kind} from {} to {}", range.start(), range.end()))
+    }
 }
 
 /// Writes to standard output. A reader that closes the pipe early is not an error.
@@ -158,6 +185,38 @@ impl Manual {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wrong_number_is_answered_with_its_range() {
+        let flights = in_range(1_u64..=100);
+        assert_eq!(flights("100"), Ok(100));
+        for wrong in ["0", "101", "-5", "1.5", "abc", ""] {
+            assert_eq!(flights(wrong), Err("must be a whole number from 1 to 100".to_owned()), "{wrong}");
+        }
+        for wrong in ["NaN", "-0.1", "inf", "1,5"] {
+            assert_eq!(
+                in_range(0.0..=50.0)(wrong),
+                Err("must be a number from 0 to 50".to_owned()),
+                "{wrong}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_negative_number_is_a_value_and_an_unknown_option_is_none() {
+        let flights = || {
+            let option = clap::Arg::new("flights").long("flights").value_parser(in_range(1_u64..=9));
+            let fly = Command::new("fly").arg(option).arg(clap::Arg::new("file"));
+            with_negative_numbers(Command::new("program").subcommand(fly))
+        };
+        let refused = |words: &[&str]| flights().try_get_matches_from(words).unwrap_err().to_string();
+        let negative = refused(&["program", "fly", "--flights", "-5"]);
+        let expected =
+            "error: invalid value '-5' for '--flights <flights>': must be a whole number from 1 to 9";
+        assert!(negative.starts_with(expected), "{negative}");
+        let unknown = refused(&["program", "fly", "-5"]);
+        assert!(unknown.starts_with("error: unexpected argument '-5' found"), "{unknown}");
+    }
 
     #[test]
     fn the_list_has_every_code() {

@@ -10,13 +10,6 @@ pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
-/// The most similar name.
-pub(crate) fn nearest<'a>(given: &str, names: impl Iterator<Item = &'a String>) -> String {
-    let likeness = |name: &str| strsim::jaro_winkler(given, name);
-    let most = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)).then_with(|| b.cmp(a)));
-    most.cloned().unwrap_or_default()
-}
-
 /// A cell that is wider does not push the others away. (A width of more than 16 bits cannot be
 /// formatted.)
 const WIDEST: usize = 200;

@@ -12,9 +12,8 @@ use std::str::FromStr;
 use avionics::log::again::mission_flown;
 use flight::vehicle::mission::Mission;
 use protocol::log::computer_v1::ComputerStart;
+use sim::recipe::nearest;
 use sim::world::Truth;
-
-use crate::print::nearest;
 
 /// A value for one key of the mission.
 #[derive(Debug, Clone, PartialEq)]
@@ -204,7 +203,8 @@ fn refusal(reason: &str, settings: &[Setting], known: &BTreeSet<String>) -> Sett
     let (true, Some(Setting { path: given, .. })) = (reason.contains("unknown field"), unknown) else {
         return SettingError::Mission { settings: listed(settings), reason: reason.to_owned() };
     };
-    SettingError::Unknown { given: given.clone(), nearest: nearest(given, known.iter()) }
+    let nearest = nearest(given, known).map_or_else(String::new, |(name, _)| name);
+    SettingError::Unknown { given: given.clone(), nearest }
 }
 
 /// The missions of a flight: that of its beginning, and those of changes at given times.

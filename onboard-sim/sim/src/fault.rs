@@ -13,6 +13,7 @@ use crate::world::sensors::{Defect, Sensor};
 use flight::rules::phase::Phase;
 
 use crate::draw::fault_shares;
+use crate::recipe::nearest;
 
 /// The faulty part.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,6 +171,14 @@ pub fn how_to_write() -> String {
     )
 }
 
+fn fault_names() -> impl Iterator<Item = String> {
+    let defects = SILENT.iter().map(|(defect, _)| *defect).chain(WRONG.iter().map(|(defect, _)| *defect));
+    let of_sensors = Sensor::ALL
+        .iter()
+        .flat_map(move |(_, sensor, _)| defects.clone().map(move |defect| format!("{sensor}-{defect}")));
+    NAMES.iter().map(|(name, _)| (*name).to_owned()).chain(of_sensors)
+}
+
 fn fault_forms() -> String {
     let with_value = |(name, takes): &(&str, Takes)| match takes {
         Takes::Nothing(_) => (*name).to_owned(),
@@ -242,7 +251,10 @@ impl FromStr for TimedFault {
                 Takes::Value(meaning, of) => (*meaning, value.and_then(of)),
             })
             .or_else(|| sensor_fault(name, value))
-            .ok_or_else(|| refuse(format!("no fault is named `{name}`")))?;
+            .ok_or_else(|| {
+                let close = nearest(name, fault_names()).map_or_else(String::new, |(close, _)| close);
+                refuse(format!("no fault is named `{name}`; did you mean `{close}`?"))
+            })?;
         let breakage = breakage.ok_or_else(|| {
             refuse(if unit.is_empty() {
                 format!("{name} takes no value")
@@ -378,6 +390,7 @@ mod tests {
         for (text, words) in [
             ("gnss-out", "no `@`"),
             ("gnss@5", "no fault is named `gnss`"),
+            ("gnss-ot@5", "no fault is named `gnss-ot`; did you mean `gnss-out`?"),
             ("gnss-out:1@5", "takes no value"),
             ("link-delay@0", "must be s, 0 to 60"),
             ("link-delay:-1@0", "must be s, 0 to 60"),

@@ -111,6 +111,15 @@ impl Recipe {
     }
 }
 
+/// Returns the name most similar to a mistyped one, and their likeness from 0 to 1.
+pub fn nearest(given: &str, names: impl IntoIterator<Item: Into<String>>) -> Option<(String, f64)> {
+    let scored = names.into_iter().map(Into::into).map(|name| {
+        let likeness = strsim::jaro_winkler(given, &name);
+        (name, likeness)
+    });
+    scored.max_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.0.cmp(&a.0)))
+}
+
 fn document_of(mission_toml: &str, origin: &str) -> Result<toml_edit::DocumentMut, MissionError> {
     let parsed = mission_toml.parse();
     parsed.map_err(|error: toml_edit::TomlError| {

@@ -12,7 +12,7 @@ use onboard_sim::run::{self, Counts};
 use onboard_sim::store::{Manifest, Store, sha256};
 use onboard_sim::summary::to_text;
 use protocol::log::build::build_info;
-use protocol::program::Exit;
+use protocol::program::{Exit, in_range};
 use serde::Serialize;
 use sim::fault::{TimedFault, how_to_write};
 
@@ -27,7 +27,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Number of flights; they are numbered from 0.
-    #[arg(long, default_value_t = 1000, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 1000, value_name = "N", value_parser = in_range(1..=1_000_000_000_u64))]
     flights: u64,
     /// Break something in every flight; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something in every flight; may be given more than once. Write {}", how_to_write()))]
@@ -38,7 +38,7 @@ pub(crate) struct CampaignArguments {
     #[arg(long, alias = "log", value_name = "PATH", required_unless_present = "only")]
     out: Option<PathBuf>,
     /// Fly only this flight, and print its row.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "jobs")]
+    #[arg(long, value_name = "NUMBER", conflicts_with = "jobs", value_parser = in_range(0..=u64::MAX))]
     only: Option<u64>,
 }
 

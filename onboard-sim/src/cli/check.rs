@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use clap::Args;
 use flight::vehicles::thrust_curve;
 use onboard_sim::check::{Candidate, Verdict, built_in, check};
-use protocol::program::Exit;
+use protocol::program::{Exit, in_range};
 use serde::Deserialize;
 
 use super::{notify, on_threads, read, recipe, show_flights};
@@ -22,17 +22,17 @@ pub(crate) struct CheckArguments {
     #[arg(long, value_name = "DIR|FILE")]
     from: Vec<PathBuf>,
     /// Flights that are flown as a check of the other rows; 0 leaves them out.
-    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(..=10_000))]
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = in_range(0..=10_000_u64))]
     flights: u64,
     /// Built-in set of dispersions (none, thrust-only, field, harsh, real, real-harsh, wild) or
     /// TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = in_range(0..=u64::MAX))]
     seed: u64,
     /// Flights at the same time; the results do not depend on it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = in_range(1..=usize::MAX))]
     jobs: Option<usize>,
 }
 

@@ -14,7 +14,7 @@ use protocol::crew_file::CrewFile;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S, VEHICLE};
 use protocol::log::recorder::Recorder;
 use protocol::log::v1::LimitResult;
-use protocol::program::{Exit, is_quiet};
+use protocol::program::{Exit, in_range, is_quiet};
 use protocol::transport::LinkAddress;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::getpgrp;
@@ -42,7 +42,7 @@ pub(crate) struct FlyArguments {
     #[arg(long, value_name = "LINK")]
     mavlink: Vec<LinkAddress>,
     /// MAVLink system id of the vehicle: each vehicle on one link needs its own.
-    #[arg(long, default_value_t = VEHICLE.system_id, value_name = "ID", value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, default_value_t = VEHICLE.system_id, value_name = "ID", value_parser = in_range(1..=u8::MAX))]
     sysid: u8,
     /// Sign every frame with this key, and ignore frames that are not signed with it. See keygen.
     #[arg(long, value_name = "FILE")]
@@ -55,12 +55,12 @@ pub(crate) struct FlyArguments {
     /// Above 2000, attitude, speed, battery, mode and GNSS go out in the messages of other ground
     /// stations, too, and the place more often than every 2 s.
     #[arg(long, value_name = "BYTES_S", default_value_t = NETWORK_BUDGET_BYTES_S,
-        value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
+        value_parser = in_range(RADIO_BUDGET_BYTES_S..=1_000_000))]
     network_budget: u32,
     /// Budget of a serial link, bytes per second, 2000 to 1000000: what the radio behind it
     /// carries, and at most four fifths of what its baud rate does.
     #[arg(long, value_name = "BYTES_S", default_value_t = RADIO_BUDGET_BYTES_S,
-        value_parser = clap::value_parser!(u32).range(i64::from(RADIO_BUDGET_BYTES_S)..=1_000_000))]
+        value_parser = in_range(RADIO_BUDGET_BYTES_S..=1_000_000))]
     serial_budget: u32,
     /// Number of this boot on the wire, 1 to 16777215, instead of a random one.
     #[arg(long, value_name = "NUMBER", value_parser = boot_number)]
@@ -74,10 +74,10 @@ pub(crate) struct FlyArguments {
     #[arg(long, value_name = "FILE|none")]
     log: Option<PathBuf>,
     /// Seed of the dispersions.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = in_range(0..=u64::MAX))]
     seed: u64,
     /// Which flight of the seed, as in campaign --only.
-    #[arg(long, default_value_t = 0, value_name = "NUMBER")]
+    #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = in_range(0..=u64::MAX))]
     flight: u64,
     /// Where the flight begins: pad, apogee or drone, if the mission has that start [default: the
     /// mission's].

@@ -22,7 +22,7 @@ use onboard_sim::progress::Progress;
 use onboard_sim::run::threads;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
-use protocol::program::is_quiet;
+use protocol::program::{in_range, is_quiet};
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 use toml_edit::{Array, DocumentMut};
@@ -38,10 +38,10 @@ pub(crate) struct Selection {
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
     /// Seed of everything random.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = in_range(0..=u64::MAX))]
     seed: u64,
     /// Flights at the same time; the results do not depend on it.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = in_range(1..=usize::MAX))]
     jobs: Option<usize>,
 }
 

@@ -31,7 +31,7 @@ use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1::LimitResult;
 use protocol::log::writer::{LogHeader, LogWriter};
-use protocol::program::Exit;
+use protocol::program::{Exit, in_range};
 use serde::Serialize;
 use sim::sortie::SetUpError;
 use sim::wire::record;
@@ -522,7 +522,7 @@ pub(crate) struct Args {
     at: Option<Moment>,
     /// Fly this many other flights of the recorded mission and dispersions, too, as recorded and
     /// with the changes.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = in_range(1..=100_000_u64))]
     flights: Option<u64>,
     /// Write the flight as a new log.
     #[arg(long, alias = "log", value_name = "FILE")]
