@@ -108,7 +108,7 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
     screen.wait_for("observed yes");
     // The events of both vehicles push it off the few rows of the pad's page.
     screen.type_bytes(b"6");
-    screen.wait_for("ABORT goes to every vehicle that is heard under id 1");
+    screen.wait_for("ABORT goes to every vehicle received under id 1");
     for mut vehicle in vehicles {
         vehicle.wait_for_line("ABORT");
         vehicle.signal(Signal::SIGTERM);
@@ -267,7 +267,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
     bob_at_ann_s.type_until(b"0AARM\r", "this screen cannot arm: this station signs as Ann");
     for _ in 0..10 {
         bob.type_by_hand(b"0AARM\r");
-        let asks = |window: &e2e::Window| window.shows("FLIGHT Bob asks to arm").then_some(());
+        let asks = |window: &e2e::Window| window.shows("FLIGHT Bob requests to arm").then_some(());
         if ann.wait_within(Duration::from_secs(3), asks).is_none() {
             continue;
         }
@@ -301,7 +301,7 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     daemon.wait_for_line("PAD_IDLE");
     let mut screen = Terminal::start(&ground(folder.path(), &["attach", "--operator", "ann"]), SIZE, false);
     screen.wait_for("every arming check passes");
-    screen.type_until(b"0AARM\r", "armed, says HEARTBEAT");
+    screen.type_until(b"0AARM\r", "armed (HEARTBEAT)");
     daemon.signal(Signal::SIGKILL);
     daemon.wait();
     screen.wait_until("that the station is gone, in every line", |window| {
@@ -383,7 +383,7 @@ fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_ali
         || Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let mut one = station();
     one.wait_for("every arming check passes");
-    one.type_until(b"0AARM\r", "armed, says HEARTBEAT");
+    one.type_until(b"0AARM\r", "armed (HEARTBEAT)");
     one.type_until(b"0SSTART\r", "hold until T-2");
     one.wait_for("armed here");
     let mut other = station();

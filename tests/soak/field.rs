@@ -101,7 +101,7 @@ impl Field {
             terminal.wait_for("every arming check passes");
         }
         screen.type_until(b"AARM\r", " ARMED ");
-        screen.wait_for("✓ armed, says HEARTBEAT");
+        screen.wait_for("✓ armed (HEARTBEAT)");
         screen.type_until(b"SSTART\r", "START  commanded");
         vehicle.wait_for_line("to AERO_DESCENT");
         self.proxy.impair(impairment);

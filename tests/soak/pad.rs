@@ -98,7 +98,7 @@ impl Pad {
             },
             Event::NoLink => {
                 self.proxy.impair(Impairment { drops_all: true, ..Impairment::default() });
-                self.screen.wait_for("LINK LOST: the vehicle is not heard");
+                self.screen.wait_for("LINK LOST: no telemetry");
                 self.proxy.impair(Impairment::default());
                 "no link".to_owned()
             }

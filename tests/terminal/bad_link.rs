@@ -87,7 +87,7 @@ fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_re
     rig.terminal.wait_for("~ARMED");
     rig.terminal.wait_for("LINK LOST");
     rig.terminal.wait_for(" PREDICTED ");
-    rig.terminal.wait_for("last heard ");
+    rig.terminal.wait_for("last data ");
     rig.terminal.wait_for("MAY NOT ARRIVE");
     rig.abort();
     rig.wait_for_attempts("ABORT", 5);

@@ -11,7 +11,7 @@ const HELD: &str = "no commanding screen in the countdown: HOLD";
 fn start(screen: &mut Terminal) {
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.wait_for("✓ armed, says HEARTBEAT");
+    screen.wait_for("✓ armed (HEARTBEAT)");
     screen.type_until(b"SSTART\r", "START  commanded");
     screen.wait_for_fact("START", "observed yes");
 }
@@ -82,5 +82,5 @@ fn a_screen_that_ends_leaves_no_answer_behind() {
     assert_eq!(screen.wait_for_end(), Some(0));
     let asked = screen.window().bytes().windows(4).any(|bytes| bytes == b"\x1b[5n");
     assert!(asked && screen.is_restored());
-    daemon.wait_for_line("nobody commands");
+    daemon.wait_for_line("no commanding screen");
 }

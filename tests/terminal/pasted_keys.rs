@@ -40,7 +40,7 @@ fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
     rig.terminal.wait_for("every arming check passes");
     rig.terminal.type_in_bunches(b"AARM\r", &[2, 3]);
     assert!(rig.terminal.confirm_if_asked(" ARMED "), "keys that came together were taken for typed ones");
-    rig.terminal.wait_for("✓ armed, says HEARTBEAT");
+    rig.terminal.wait_for("✓ armed (HEARTBEAT)");
     rig.terminal.type_in_bunches(b"SSTART\r", &[1, 4, 2]);
     assert!(rig.terminal.confirm_if_asked("START  commanded"));
     rig.wait_for_fact("START", "observed yes");

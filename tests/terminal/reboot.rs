@@ -135,7 +135,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
         station.wait_for("every arming check passes");
         station.type_until(b"AARM\r", " ARMED ");
         flying.wait_for_line("PAD_ARMED");
-        station.wait_for("✓ armed, says HEARTBEAT");
+        station.wait_for("✓ armed (HEARTBEAT)");
         station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
         station.wait_for("AERO_DESCENT");

@@ -11,7 +11,7 @@ fn logs_that_are_removed_in_the_countdown_are_an_alarm_and_lose_nothing() {
     let mut screen = pad.attach(&[], &[]);
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.wait_for("✓ armed, says HEARTBEAT");
+    screen.wait_for("✓ armed (HEARTBEAT)");
     screen.type_until(b"SSTART\r", "START  commanded");
     for file in ["flight.mcap", "flight.tlog"] {
         std::fs::remove_file(pad.folder.path().join(file)).unwrap();

@@ -80,7 +80,7 @@ impl Rig {
     pub(crate) fn arm(&mut self) -> usize {
         self.terminal.wait_for("every arming check passes");
         let climbed = self.type_until(b"AARM\r", " ARMED ");
-        self.terminal.wait_for("✓ armed, says HEARTBEAT");
+        self.terminal.wait_for("✓ armed (HEARTBEAT)");
         climbed
     }
 

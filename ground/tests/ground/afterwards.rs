@@ -54,7 +54,7 @@ fn the_review_says_how_much_of_the_flight_was_not_heard() {
     rig.speaks = false;
     rig.run(5.0);
     assert_eq!(said(&rig), "no verdict received yet; link LOST before touchdown");
-    assert!(rig.screen(140, 45).contains("not told yet"), "{}", rig.screen(140, 45));
+    assert!(rig.screen(140, 45).contains("not reported yet"), "{}", rig.screen(140, 45));
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_SAFED;
     rig.run(2.0);
@@ -97,7 +97,7 @@ fn an_attached_screen_asks_the_station_for_the_report() {
 
 fn kept(rig: &Rig) -> Vec<LastPlace> {
     let place = |action: &Action| match action {
-        Action::KeepPlace(place) => Some(**place),
+        Action::StorePlace(place) => Some(**place),
         _ => None,
     };
     rig.actions.iter().filter_map(place).collect()
@@ -112,14 +112,14 @@ fn the_last_place_is_kept_in_flight_and_predicted_after_the_loss() {
     let mut rig = falling(Role::Station);
     let places = kept(&rig);
     assert!((1..=2).contains(&places.len()), "every 2 s: {places:?}");
-    assert!(places[0].predicted.is_none() && (places[0].heard.north_m - 30.0).abs() < 0.1);
+    assert!(places[0].predicted.is_none() && (places[0].received.north_m - 30.0).abs() < 0.1);
     rig.speaks = false;
     rig.actions.clear();
     rig.run(20.0);
     let places = kept(&rig);
     let last = places.last().unwrap();
     let predicted = last.predicted.unwrap();
-    assert!(predicted.error_m > last.heard.error_m && last.heard_unix_s <= 1_800_000_004, "{last:?}");
+    assert!(predicted.error_m > last.received.error_m && last.received_unix_s <= 1_800_000_004, "{last:?}");
     assert!((places.len()) <= 11, "{}", places.len());
     rig.key(Key::Char('f'));
     for (columns, rows) in [(80, 24), (140, 45), (200, 60)] {
@@ -156,7 +156,7 @@ fn the_place_of_a_vehicle_that_has_not_told_its_pad_is_known() {
     rig.hear(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA { lat, lon, ..Default::default() }));
     rig.run(1.0);
     let place = rig.model.last_place(rig.now).unwrap();
-    let (north_m, east_m) = there.to(place.degrees(&place.heard).unwrap());
+    let (north_m, east_m) = there.to(place.degrees(&place.received).unwrap());
     assert!(north_m.abs() < 0.1 && east_m.abs() < 0.1, "{place:?}");
     assert!(place.pad.is_some_and(|pad| (pad.latitude - PAD.latitude).abs() < 1e-6), "{place:?}");
     // Where it lies, for a phone's camera, beside DO NOT APPROACH on the smallest screen, too.
@@ -191,7 +191,7 @@ fn dots(rig: &Rig, (columns, rows): (u16, u16)) -> Vec<(f64, f64)> {
 fn the_arrow_points_to_the_vehicle() {
     for (north_m, east_m) in [(50.0, 0.0), (-50.0, 0.0), (0.0, 50.0), (0.0, -50.0)] {
         let mut place = *kept(&falling(Role::Station)).last().unwrap();
-        (place.heard.north_m, place.heard.east_m, place.predicted) = (north_m, east_m, None);
+        (place.received.north_m, place.received.east_m, place.predicted) = (north_m, east_m, None);
         let mut rig = Rig::new(settings(false, true));
         rig.msg(Msg::Place(Box::new(place)));
         rig.run(1.0);

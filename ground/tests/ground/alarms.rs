@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{AlarmKind, RING_EVERY, Role, Settings, refused_frames, unheard_hints};
+use ground::model::{AlarmKind, RING_EVERY, Role, Settings, link_hints, refused_frames};
 use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
 use ground::view::headline::pad;
@@ -74,13 +74,13 @@ fn a_log_of_the_vehicle_that_stops_in_flight_is_an_alarm_that_stays() {
     };
     rig.hear(&status(log));
     rig.run(1.0);
-    let is_told = |rig: &Rig| rig.model.alarms.is_unseen(AlarmKind::VehicleLog);
-    assert!(!is_told(&rig));
+    let is_reported = |rig: &Rig| rig.model.alarms.is_unseen(AlarmKind::VehicleLog);
+    assert!(!is_reported(&rig));
     rig.hear(&status(MavSysStatusSensor::empty()));
     rig.run(30.0);
-    assert!(is_told(&rig) && rig.model.vehicle.log_has_stopped());
+    assert!(is_reported(&rig) && rig.model.vehicle.log_has_stopped());
     let text = rig.model.alarms.foremost().map(|alarm| alarm.what.text.as_str());
-    assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded whole"));
+    assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded completely"));
 }
 
 /// On the pad it is a failing check, and on the way up no receiver holds its fix.
@@ -175,7 +175,7 @@ fn attaching_does_not_ring_for_past_alarms() {
     over.run(30.0);
     assert_eq!(bells(&over), 0);
     let screen = over.screen(80, 24);
-    assert!(screen.contains(" past alarm: LINK LOST: the vehicle is not heard ended 89 s ago"), "{screen}");
+    assert!(screen.contains(" past alarm: LINK LOST: no telemetry ended 89 s ago"), "{screen}");
     over.speaks = false;
     over.run(5.0);
     assert_eq!(bells(&over), 1, "lost anew");
@@ -333,19 +333,19 @@ fn a_vehicle_that_was_never_heard_has_hints_on_the_main_page() {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     rig.run(4.0);
-    assert_eq!(unheard_hints(&rig.model, rig.now), None);
+    assert_eq!(link_hints(&rig.model, rig.now), None);
     rig.run(3.0);
     for size in [(80, 24), (80, 22), (120, 40), (40, 12)] {
         let screen = rig.screen(size.0, size.1);
-        assert!(screen.contains("Nothing heard from system 1"), "{screen}");
+        assert!(screen.contains("Nothing received from system 1"), "{screen}");
         assert!(size.0 < 80 || screen.contains("fitted?"), "{screen}");
     }
     let screen = rig.screen(80, 24);
     assert!(screen.contains("It listens on 127.0.0.1:14550"), "{screen}");
-    assert_eq!(rig.events().matches("Nothing heard").count(), 1);
+    assert_eq!(rig.events().matches("Nothing received").count(), 1);
     rig.speaks = true;
     rig.run(2.0);
-    assert_eq!(unheard_hints(&rig.model, rig.now), None);
+    assert_eq!(link_hints(&rig.model, rig.now), None);
 }
 
 /// A wrong key: an alarm with the number of frames, and the hint on the page.

@@ -68,7 +68,7 @@ fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
     rig.hear(&MavMessage::TD_CREW(ask.clone()));
     rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { ask_left_ms: 8_000, ..ask }));
     rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, ..crew.clone() }));
-    assert_eq!(has(&rig, "vehicle says", "key 2: asks to arm (ask 4711)"), 1);
+    assert_eq!(has(&rig, "vehicle says", "key 2: requests to arm (request 4711)"), 1);
     let by = entered(&rig).into_iter().find(|line| line.text.contains("is in command")).unwrap();
     assert_eq!(by.who, "FLIGHT Bob");
     // Whichever message is first. Only the one who requested a hold is entered as a person.

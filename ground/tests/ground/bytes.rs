@@ -160,7 +160,7 @@ fn flight_over(
             assert!(now < fresh_at + Duration::from_secs(2), "{now:?}: old pictures");
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
             if let Some(slow) = &mut slow {
-                let late = slow.take(bytes, pace.asks(now), now).saturating_sub(now);
+                let late = slow.take(bytes, pace.begins_query(now), now).saturating_sub(now);
                 // A whole page of this size takes 3.5 s on this line; nothing waits behind more
                 // than half a second of another.
                 assert!(late < Duration::from_secs(4), "{now:?}: {late:?}");

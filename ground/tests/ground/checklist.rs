@@ -56,7 +56,7 @@ fn list(rig: &Rig) -> &Checklist {
 }
 
 fn asked(rig: &mut Rig, step: u8, void: bool, who: &str) {
-    rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, who) });
+    rig.msg(Msg::Requested { request: Request::Sign { step, void }, by: Seat::new(2, who) });
 }
 
 fn sign_all(rig: &mut Rig) {
@@ -97,7 +97,7 @@ fn a_step_is_signed_on_the_pad_page_with_a_key_and_enter() {
     let kept = rig
         .actions
         .iter()
-        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Marked { step: 0, .. })));
+        .filter(|action| matches!(action, Action::StoreChecklist(ChecklistEntry::Marked { step: 0, .. })));
     assert_eq!(kept.count(), 1);
     let booked = rig.actions.iter().any(|action| match action {
         Action::Enter(line) => {
@@ -185,7 +185,7 @@ fn who_may_not_sign_is_refused_with_the_reason() {
     asked(&mut rig, 0, false, "Eve");
     asked(&mut rig, 0, false, "");
     asked(&mut rig, 99, false, "Ann");
-    for why in ["Eve is not in the crew", "nobody is named", "there is no such step"] {
+    for why in ["Eve is not in the crew", "no operator is named", "there is no such step"] {
         assert!(rig.events().contains(why), "{why}: {}", rig.events());
     }
     assert!(!list(&rig).is_touched());
@@ -250,7 +250,7 @@ fn after_the_liftoff_every_step_is_open_for_the_next_flight() {
     let flown = rig
         .actions
         .iter()
-        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Flown { .. })));
+        .filter(|action| matches!(action, Action::StoreChecklist(ChecklistEntry::Flown { .. })));
     assert_eq!(flown.count(), 1);
 }
 

@@ -30,10 +30,10 @@ fn every_check_that_fails_while_it_is_armed_is_an_alarm_with_its_name_and_no_go(
         rig.checks_failed = check.bits();
         rig.run(0.2);
         let words = ground::model::words::check(name);
-        let is_told = check != TdCheck::TD_CHECK_UPLINK;
-        assert_eq!(is_alarmed(&rig, &format!("ARMED, and NO-GO: {words}")), is_told, "{name}");
-        assert_eq!(pad(&rig.model, rig.now).text == "NO-GO", is_told, "{name}");
-        if is_told {
+        let is_reported = check != TdCheck::TD_CHECK_UPLINK;
+        assert_eq!(is_alarmed(&rig, &format!("ARMED, and NO-GO: {words}")), is_reported, "{name}");
+        assert_eq!(pad(&rig.model, rig.now).text == "NO-GO", is_reported, "{name}");
+        if is_reported {
             for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
                 let screen = rig.screen(columns, rows);
                 assert!(screen.contains(&format!("ALARM ARMED, and NO-GO: {words}")), "{screen}");
@@ -69,7 +69,7 @@ fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again()
         rig.run(2.0);
         let words = if text_first || text_last { "no GNSS fix" } else { "gnss" };
         let screen = rig.screen(80, 24);
-        assert!(screen.contains(&format!("HOLD: {words}; start anew; disarms in 42 s")), "{screen}");
+        assert!(screen.contains(&format!("HOLD: {words}; start again; disarms in 42 s")), "{screen}");
         assert_eq!(pad(&rig.model, rig.now).text, "HOLD");
         // Another hold has its own check.
         rig.hold = TdHold::TD_HOLD_NONE;
@@ -77,7 +77,7 @@ fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again()
         rig.checks_failed = TdCheck::TD_CHECK_FINS.bits();
         rig.hold = TdHold::TD_HOLD_CHECK_FAILED;
         rig.run(0.2);
-        rig.expect_screen("HOLD: fins; start anew");
+        rig.expect_screen("HOLD: fins; start again");
     }
 }
 

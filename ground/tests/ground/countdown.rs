@@ -181,9 +181,9 @@ fn nothing_is_armed_or_started_on_news_older_than_three_seconds() {
     pad.run(20.0);
     assert!(pad.model.link.state(pad.now).carries(), "frames arrive all the time");
     let why = why_not_arm(&pad.model, pad.now).expect("refused");
-    assert!(why.starts_with("what the vehicle said last is 6."), "{why}");
+    assert!(why.starts_with("the newest telemetry is 6."), "{why}");
     let (words, _) = readiness(&pad.model, pad.now).expect("checks");
-    assert!(words.starts_with("NO-GO: what the vehicle said last"), "{words}");
+    assert!(words.starts_with("NO-GO: the newest telemetry"), "{words}");
     pad.ask(CommandKind::Arm);
     pad.run(7.0);
     assert!(!pad.vehicle.mode().interlocks.armed);

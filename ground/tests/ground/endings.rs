@@ -132,8 +132,8 @@ fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     assert_eq!(ending(&rig), None);
     rig.run(60.0);
     assert_eq!(ending(&rig), Some(Ending::Lost));
-    assert!(reason(&rig).unwrap().starts_with(" LOST: it fell silent in flight and must be down"));
-    assert!(alarm_texts(&rig).iter().any(|text| text.starts_with("LOST: it fell silent")));
+    assert!(reason(&rig).unwrap().starts_with(" LOST: it went silent in flight and must be down"));
+    assert!(alarm_texts(&rig).iter().any(|text| text.starts_with("LOST: it went silent")));
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.motor = TdMotor::TD_MOTOR_HOT;
@@ -233,7 +233,7 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     rig.run(1.6);
     assert_eq!(reason(&rig), None, "not yet");
     rig.run(12.2);
-    let words = " MAY BE IN THE AIR since T-0, unheard from T-1.8 s; meant to land within 120 m";
+    let words = " MAY BE IN THE AIR since T-0, silent since T-1.8 s; should land within 120 m";
     assert_eq!(reason(&rig).as_deref(), Some(words));
     assert!(is_on_pages(&mut rig, "123456789?ftx"));
     let state = rig.screen(80, 24).lines().nth(1).unwrap_or_default().to_owned();
@@ -244,7 +244,7 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     rig.key(Key::Char('f'));
     let find = rig.screen(80, 24);
     assert!(find.contains("120 m, the fence of its"), "{find}");
-    assert!(rig.events().contains("MAY BE IN THE AIR: not heard since T-1.8 s"), "{}", rig.events());
+    assert!(rig.events().contains("MAY BE IN THE AIR: no telemetry since T-1.8 s"), "{}", rig.events());
 }
 
 /// The link is back after the landing: the page of the lost vehicle knows what the verdict knows.
@@ -254,7 +254,7 @@ fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
     rig.run(40.0);
     rig.verdict_at(40.7);
     let place = rig.model.last_place(rig.now).expect("it has left the pad");
-    assert!((place.predicted.unwrap_or(place.heard).error_m - 42.0).abs() < 0.5, "{place:?}");
+    assert!((place.predicted.unwrap_or(place.received).error_m - 42.0).abs() < 0.5, "{place:?}");
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.run(1.0);
@@ -276,7 +276,7 @@ fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
     rig.run(0.3);
-    assert_eq!(reason(&rig).as_deref(), Some(" LIFT-OFF that nobody commanded: TAKE COVER, look up"));
+    assert_eq!(reason(&rig).as_deref(), Some(" LIFT-OFF, uncommanded: TAKE COVER, look up"));
     assert!(is_on_pages(&mut rig, "123456789?ftx"));
     let abort = top_lines::abort(&rig.model, MONO, rig.now, 80).to_string();
     assert_eq!(abort, " abort now: ABORTED already: parachute at apogee");
@@ -310,13 +310,13 @@ fn the_review_says_what_went_wrong() {
     let sink = TdLimit::TD_LIMIT_VERTICAL_SPEED;
     let mut rig = judged([2.4, 0.3], TdLanding::empty(), sink, TdChute::TD_CHUTE_STOWED);
     rig.key(Key::Char('4'));
-    assert!(rig.screen(120, 36).contains("not told yet"), "{}", rig.screen(120, 36));
+    assert!(rig.screen(120, 36).contains("not reported yet"), "{}", rig.screen(120, 36));
     rig.finding(1, 3, 15.75, "landing motor's impulse 0.867 of the mission's");
     rig.finding(0, 3, 21.5, "no plan that lands for 1.2 s\u{1b}[2J");
     for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
         let screen = rig.screen(columns, rows);
         let [impulse, plan, more] =
-            ["T+15.8", "T+21.5", "1 more not heard yet"].map(|part| screen.find(part));
+            ["T+15.8", "T+21.5", "1 more not received yet"].map(|part| screen.find(part));
         assert!(impulse.is_some() && impulse < plan && plan < more, "{screen}");
         assert!(screen.contains("what went wrong") && screen.contains("landing motor's"), "{screen}");
         assert!(!screen.contains('\u{1b}'), "{screen}");

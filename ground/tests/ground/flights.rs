@@ -129,14 +129,14 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
             carried_since.get_or_insert(now);
             let line = status_lines::next_event(&model, now, false).expect("it flies");
             let (_, rest) = line.split_once("ground in ").unwrap_or_else(|| panic!("{line}"));
-            let told_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
+            let reported_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
             let flown_s = down.saturating_sub(now).as_secs_f64();
             let settled = now.checked_sub(carried_since.unwrap()) > Some(Duration::from_secs(2));
             // The canopy still brakes when it begins to carry, and gusts and the estimated height
             // move what is told.
             let share = if settled { 0.15 } else { 0.5 };
             assert!(
-                (told_s - flown_s).abs() <= share * flown_s + 1.0,
+                (reported_s - flown_s).abs() <= share * flown_s + 1.0,
                 "flight {number}, {flown_s:.1} s before the ground: {line}"
             );
             told += 1;

@@ -288,13 +288,13 @@ fn a_hold_shows_its_reason_and_what_happens_next() {
     rig.run(1.0);
     rig.hold = TdHold::TD_HOLD_UPLINK_SILENT;
     rig.run(0.2);
-    let words = "HOLD: the vehicle did not hear this station for 1 s; start anew; disarms in 42 s";
+    let words = "HOLD: no uplink from this station for 1 s; start again; disarms in 42 s";
     assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
     assert!(rig.events().contains(words));
     assert_eq!(rig.events().matches("HOLD").count(), 1);
     rig.hold = TdHold::TD_HOLD_COMMANDED;
     rig.run(0.2);
-    assert!(rig.screen(80, 24).contains("HOLD: a station asked for it; start anew"));
+    assert!(rig.screen(80, 24).contains("HOLD: a station requested it; start again"));
     rig.hold = TdHold::TD_HOLD_NONE;
     rig.run(0.2);
     assert!(!rig.screen(80, 24).contains("\"HOLD: a station"));

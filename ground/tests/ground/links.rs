@@ -45,7 +45,7 @@ fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     assert!(screen.contains("all links") && screen.contains(" 1590/5760 "), "{screen}");
     rig.msg(links(Some("unplugged")));
     assert!(rig.screen(140, 40).contains("serial:/dev/x:57600 DOWN unplugged"));
-    rig.msg(Msg::LinkSays("one link down: /dev/x: unplugged".to_owned()));
+    rig.msg(Msg::LinkWarning("one link down: /dev/x: unplugged".to_owned()));
     rig.expect_event("one link down");
     assert!(!rig.model.alarms.is_unseen(AlarmKind::LinkDown), "the other still works");
 }

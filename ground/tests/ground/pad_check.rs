@@ -130,7 +130,7 @@ fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('x'));
     rig.keys(&[Key::Char('Y')]);
-    rig.expect_event("no check of servos that tell nothing has passed");
+    rig.expect_event("no check of servos without feedback has passed");
     rig.run(3.0);
     tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
     let words = "gimbal pitch nozzle swings towards fins 1 and 4, then towards 2 and 3";

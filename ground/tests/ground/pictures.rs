@@ -64,7 +64,7 @@ fn with_checklist() -> Rig {
     let list = ground::model::parse_checklist(include_str!("../../checklist-example.toml"));
     rig.msg(Msg::Checklist(Box::new(list.expect("the example is a checklist"))));
     for (step, void) in [(0, false), (1, false), (3, false), (1, true)] {
-        rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });
+        rig.msg(Msg::Requested { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });
     }
     rig.key(Key::Char('k'));
     rig.run(1.0);

@@ -73,9 +73,9 @@ fn timesync_is_answered_and_the_round_trip_is_shown() {
     let answered =
         rig.actions.iter().any(|action| matches!(action, Action::Send(message) if answers(message)));
     assert!(answered);
-    let asked_at = i64::try_from(rig.now.as_nanos()).unwrap();
+    let requested_at = i64::try_from(rig.now.as_nanos()).unwrap();
     rig.run(0.2);
-    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: asked_at, ..Default::default() }));
+    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: requested_at, ..Default::default() }));
     rig.key(Key::Char('5'));
     rig.expect_screen("round trip 200 ms");
 }

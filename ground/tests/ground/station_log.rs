@@ -150,7 +150,7 @@ fn a_station_log_that_fails_in_the_countdown_holds_it() {
         let mut rig = armed();
         if nolog {
             rig.msg(Msg::Log(FAILED));
-            rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::default() });
+            rig.msg(Msg::Requested { request: Request::WithoutLog, by: Seat::default() });
         }
         rig.countdown_ms = 8_000;
         rig.run(1.0);

@@ -92,7 +92,7 @@ fn the_other_s_ask_is_on_this_screen_and_confirmed_by_its_number() {
     let mut rig = station_of(ANN, None);
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("FLIGHT Bob asks to arm."), "{screen}");
+    assert!(screen.contains("FLIGHT Bob requests to arm."), "{screen}");
     assert!(screen.contains("Press A within 9 s, then type CONFIRM and Enter to confirm."), "{screen}");
     rig.take_commands();
     // The word of an ask confirms nothing.
@@ -133,7 +133,7 @@ fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
     );
     rig.key(Key::Enter);
     assert_eq!(rig.take_commands(), []);
-    rig.expect_event("nothing is confirmed: it is no longer asked");
+    rig.expect_event("nothing is confirmed: the request has lapsed");
 }
 
 #[test]
@@ -141,7 +141,7 @@ fn an_own_ask_says_who_must_confirm_and_is_no_refusal() {
     let mut rig = station_of(BOB, None);
     rig.key(Key::Char('A'));
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("This only asks: RANGE SAFETY or PAD must confirm within 10 s."), "{screen}");
+    assert!(screen.contains("This is a request: RANGE SAFETY or PAD must confirm within 10 s."), "{screen}");
     rig.keys(&enter("ARM"));
     let sent = rig.take_commands();
     assert!(matches!(&sent[..], [command] if is_arm(command) && command.param3.to_bits() == 0), "{sent:?}");
@@ -149,8 +149,8 @@ fn an_own_ask_says_who_must_confirm_and_is_no_refusal() {
     rig.answer_with(GROUND, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, rejected, 4_711);
     asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_500);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("You ask to arm."), "{screen}");
-    assert!(screen.contains("acknowledged asked"), "{screen}");
+    assert!(screen.contains("You request to arm."), "{screen}");
+    assert!(screen.contains("acknowledged requested"), "{screen}");
     assert!(!screen.contains("REFUSED"), "{screen}");
     // Nobody confirms their own ask here, either.
     rig.keys(&confirm());
@@ -187,8 +187,8 @@ fn anyone_holds_and_the_screen_says_who_held_and_why() {
     );
     rig.countdown_ms = i32::MAX;
     for (hold, held_by, words) in [
-        (TdHold::TD_HOLD_COMMANDED, ANN, "HOLD: RANGE SAFETY Ann asked for it; start anew"),
-        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 1 s; start anew"),
+        (TdHold::TD_HOLD_COMMANDED, ANN, "HOLD: RANGE SAFETY Ann requested it; start again"),
+        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 1 s; start again"),
     ] {
         rig.hold = hold;
         crew(&mut rig, TD_CREW_DATA { held_by, commanded_by: BOB, ..TD_CREW_DATA::default() });

@@ -18,7 +18,7 @@ const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
 /// What was kept last.
 fn kept(rig: &Rig) -> Option<Unfinished> {
     rig.actions.iter().rev().find_map(|action| match action {
-        Action::KeepUnfinished(kept) => Some(kept.clone()),
+        Action::StoreUnfinished(kept) => Some(kept.clone()),
         _ => None,
     })
 }
@@ -128,9 +128,9 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
     let asked = Some("12:03:05 UTC (screen 2, Ann)".to_owned());
     rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked.clone(), danger: None })));
     rig.run(1.0);
-    let words = "ABORT asked at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
+    let words = "ABORT requested at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
     assert!(rig.screen(120, 36).contains(words), "{}", rig.screen(120, 36));
-    rig.expect_event("an ABORT was asked for at 12:03:05 UTC (screen 2, Ann)");
+    rig.expect_event("an ABORT was requested at 12:03:05 UTC (screen 2, Ann)");
     assert!(rig.take_commands().is_empty(), "nothing is sent by itself");
     // It ends when somebody has seen it, or with another abort.
     rig.key(Key::Char(' '));
@@ -191,7 +191,7 @@ fn asks(rig: &mut Rig) {
     rig.actions.clear();
     rig.abort();
     assert!(rig.actions.contains(&Action::Request(Request::Command(CommandKind::Abort))));
-    rig.model.link.abort_asked_at = Some(rig.now);
+    rig.model.link.abort_requested_at = Some(rig.now);
 }
 
 #[test]
@@ -203,13 +203,13 @@ fn an_abort_that_a_hung_station_has_not_sent_is_the_largest_word_of_every_page()
     // It may be asked for before the silence is long enough to be one.
     let mut after = hung();
     asks(&mut after);
-    after.expect_screen("ABORT asked, not yet taken by the station");
+    after.expect_screen("ABORT requested, not yet accepted by the station");
     hangs(&mut after, 3);
     for mut rig in [before, after] {
         for digit in "123456789".chars() {
             rig.key(Key::Char(digit));
             let screen = rig.screen(80, 24);
-            let words = " ABORT NOT SENT: the station hangs; it sends it when it goes on";
+            let words = " ABORT NOT SENT: the station hangs; it sends it when it resumes";
             assert!(screen.lines().nth(2).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
             assert!(screen.lines().nth(3).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
             assert!(screen.lines().nth(4).is_some_and(|row| row.contains('▀')), "{digit} large: {screen}");

@@ -104,7 +104,7 @@ fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
         rig.keys(&enter(word));
         assert!(rig.actions.contains(&Action::Request(request.clone())));
         assert_ne!(stops(&rig), None, "the station decides");
-        rig.msg(Msg::Asked { request, by: Seat::new(2, "bob on pts/2") });
+        rig.msg(Msg::Requested { request, by: Seat::new(2, "bob on pts/2") });
         assert_eq!(stops(&rig), None);
         rig.expect_event("(screen 2, bob on pts/2)");
     }

@@ -31,13 +31,13 @@ fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     let screen = rig.screen(80, 24);
     assert_eq!(directions(&rig), "down 0s UP LOST 4s ");
     assert!(screen.contains("ALARM UPLINK LOST") && screen.contains("NO-GO: uplink not proven"), "{screen}");
-    assert!(screen.contains("▶ it hears us"), "{screen}");
+    assert!(screen.contains("▶ uplink proven"), "{screen}");
     rig.keys(&ladder());
     assert!(rig.take_commands().is_empty(), "no offer to arm, and so nothing is sent");
     rig.expect_event("cannot arm: the uplink is not proven");
     rig.hears = true;
     rig.run(1.0);
-    rig.expect_screen("✓ it hears us");
+    rig.expect_screen("✓ uplink proven");
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
 }
@@ -71,11 +71,11 @@ fn a_vehicle_that_accepts_nothing_says_why() {
             ..TD_UPLINK_DATA::default()
         }));
     }
-    assert_eq!(rig.model.link.uplink.state(rig.now), LinkState::NeverHeard);
+    assert_eq!(rig.model.link.uplink.state(rig.now), LinkState::NeverReceived);
     let alarm = rig.model.alarms.foremost().map(|alarm| &alarm.what).unwrap();
     let why = "it refuses frames of 255/190: not signed, is the key missing here?";
     assert_eq!(alarm.kind, AlarmKind::UplinkLost);
-    assert_eq!(alarm.text, format!("UPLINK LOST: the vehicle does not hear this station; {why}"));
+    assert_eq!(alarm.text, format!("UPLINK LOST: the vehicle does not receive this station; {why}"));
     rig.key(Key::Char('5'));
     assert!(rig.screen(140, 45).contains("refused  7 of 255/190 by the vehicle"), "{}", rig.screen(140, 45));
 }

@@ -19,7 +19,7 @@ fn rig(amount: Amount, has_voice: bool) -> Rig {
 
 fn said(rig: &mut Rig) -> Vec<String> {
     let said = std::mem::take(&mut rig.actions).into_iter().filter_map(|action| match action {
-        Action::Say(text) => Some(text),
+        Action::CallOut(text) => Some(text),
         _ => None,
     });
     said.collect()
@@ -58,7 +58,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
     let mut rig = rig(Amount::Normal, true);
     fly(&mut rig);
     let expected = [
-        "commanded to light",
+        "ignition commanded",
         "liftoff",
         "50 metres",
         "100 metres",
@@ -127,7 +127,7 @@ fn no_go_and_a_lost_link_are_called_out_once() {
 fn without_a_voice_bells_differ() {
     let bells = |rig: &mut Rig| {
         let actions = std::mem::take(&mut rig.actions);
-        assert!(!actions.iter().any(|action| matches!(action, Action::Say(_))));
+        assert!(!actions.iter().any(|action| matches!(action, Action::CallOut(_))));
         actions.iter().filter(|action| **action == Action::Bell).count()
     };
     let mut rig = rig(Amount::Normal, false);

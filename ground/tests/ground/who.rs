@@ -81,7 +81,7 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
     beside(&mut rig, 9, 5);
     assert!(rig.take_commands().iter().filter(|sent| is_abort(sent)).count() > 20);
     rig.expect_event("cannot arm: TWO VEHICLES under id 1: switch one off");
-    rig.expect_event("the ABORT goes to every vehicle that is heard under id 1");
+    rig.expect_event("the ABORT goes to every vehicle received under id 1");
 }
 
 /// The crew switches the second vehicle off, whichever is shown.
@@ -170,12 +170,12 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
 #[test]
 fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
     let mut rig = counting();
-    rig.msg(Msg::HeardFrom(1));
+    rig.msg(Msg::ReceivedFrom(1));
     rig.run(1.0);
-    rig.msg(Msg::HeardFrom(2));
+    rig.msg(Msg::ReceivedFrom(2));
     rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission(), None);
-    rig.msg(Msg::HeardFrom(1));
+    rig.msg(Msg::ReceivedFrom(1));
     rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission().as_ref().map(|mission| mission.hash.0), Some([8; 8]));
 }
@@ -185,7 +185,7 @@ fn one_of_two_vehicles_is_chosen_by_name_and_then_armed() {
     let mut rig = Rig::crewed();
     beside(&mut rig, 9, 1);
     // Nobody is heard with that one.
-    rig.msg(Msg::Asked { request: Request::Choose(8), by: Seat::default() });
+    rig.msg(Msg::Requested { request: Request::Choose(8), by: Seat::default() });
     beside(&mut rig, 9, 1);
     assert!(![Some(8), Some(9)].contains(&rig.model.vehicle.boot.number()));
     assert!(ground::model::why_nothing_moves(&rig.model, rig.now).is_some());
