@@ -108,7 +108,7 @@ fn no_start_is_offered_or_sent_while_any_check_fails_and_the_line_names_it() {
 }
 
 #[test]
-fn the_pad_page_the_prompt_and_the_line_say_a_failing_check_in_the_vehicle_s_words() {
+fn the_pad_page_the_prompt_and_the_line_quote_the_vehicle_on_a_failing_check() {
     let mut rig = Rig::crewed();
     rig.checks_failed = (GNSS | TdCheck::TD_CHECK_SPEED).bits();
     rig.text("not ready: no GNSS fix for 3 s");
@@ -134,7 +134,7 @@ fn the_height_below_a_drone_counts_only_for_a_vehicle_that_hangs() {
     let all = TdCheck::all().iter().count();
     for (start, made) in [(TdStart::TD_START_PAD, all - 1), (TdStart::TD_START_DRONE, all)] {
         let mut rig = Rig::crewed();
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { start, ..TD_MISSION_DATA::default() }));
+        rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { start, ..TD_MISSION_DATA::default() }));
         rig.run(0.2);
         let screen = rig.screen(200, 60);
         assert!(screen.contains(&format!("{made} of {made} checks")), "{screen}");

@@ -1,4 +1,4 @@
-//! How a flight ended, why its motor was inhibited, and a flight that nobody heard.
+//! How a flight ended, why its motor was inhibited, and a flight in silence.
 
 use ground::key::Key;
 use ground::model::Ending;
@@ -106,9 +106,9 @@ fn an_impact_with_a_parachute_that_did_not_fill_is_lost() {
     assert_eq!(hard.as_deref(), Some("HARD LANDING: it did not stay upright"));
 }
 
-/// A vehicle that tells no verdict, as one without a simulated world does.
+/// A vehicle that reports no verdict, as one without a simulated world does.
 #[test]
-fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
+fn without_a_verdict_only_an_open_parachute_is_claimed() {
     let mut rig = descending();
     rig.descent_with(3.0, -6.0, TdChute::TD_CHUTE_OPEN);
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
@@ -121,7 +121,7 @@ fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
 }
 
 /// A vehicle that falls silent is in flight until it must be down; then it is lost until it is
-/// heard again.
+/// received again.
 #[test]
 fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     let mut rig = descending();
@@ -139,16 +139,16 @@ fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     rig.motor = TdMotor::TD_MOTOR_HOT;
     rig.approach_wait_s = 20;
     rig.run(1.0);
-    assert_eq!(ending(&rig), None, "it is heard again");
+    assert_eq!(ending(&rig), None, "telemetry arrives again");
 }
 
-/// Until the canopy carries, no time is told: the speed is that of a fall.
+/// Until the canopy carries, no time is shown: the speed is that of a fall.
 #[test]
-fn no_time_is_told_before_the_canopy_carries() {
+fn no_time_is_shown_before_the_canopy_carries() {
     let mut rig = descending();
     rig.phase = TdPhase::TD_PHASE_CHUTE;
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
-    // The phase is told before the parachute is.
+    // The phase is reported before the parachute is.
     for chute in [TdChute::TD_CHUTE_STOWED, TdChute::TD_CHUTE_FIRED] {
         rig.descent_with(90.0, -40.0, chute);
         rig.state(4.0, 90.0, -0.6, -40.0, 88.0);
@@ -212,8 +212,8 @@ fn a_text_is_the_reason_of_a_latch_without_one() {
         alarms.iter().find(|alarm| alarm.what.text.starts_with("ABORT")).map(|alarm| alarm.what.text.clone())
     };
     assert_eq!(
-        latched("an old trouble", Some("LIFT-OFF that nobody asked for")).as_deref(),
-        Some("ABORT LATCHED: LIFT-OFF that nobody asked for")
+        latched("an old trouble", Some("LIFT-OFF without a command")).as_deref(),
+        Some("ABORT LATCHED: LIFT-OFF without a command")
     );
 }
 
@@ -287,7 +287,7 @@ fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
     assert_eq!(reason(&rig), None);
 }
 
-/// The vehicle held its countdown in the silence: when it is heard again, nothing was in the air.
+/// The vehicle held its countdown in the silence: when telemetry returns, nothing was in the air.
 #[test]
 fn a_hold_in_the_silence_takes_the_warning_back() {
     let mut rig = unheard();
@@ -306,7 +306,7 @@ fn a_hold_in_the_silence_takes_the_warning_back() {
 
 /// The review begins with what the vehicle found, first in time; what has not arrived is said.
 #[test]
-fn the_review_says_what_went_wrong() {
+fn the_review_lists_what_went_wrong() {
     let sink = TdLimit::TD_LIMIT_VERTICAL_SPEED;
     let mut rig = judged([2.4, 0.3], TdLanding::empty(), sink, TdChute::TD_CHUTE_STOWED);
     rig.key(Key::Char('4'));
@@ -322,7 +322,7 @@ fn the_review_says_what_went_wrong() {
         assert!(!screen.contains('\u{1b}'), "{screen}");
     }
     rig.finding(2, 3, 25.0, "battery down to 6.50 V");
-    assert!(!rig.screen(120, 36).contains("not heard yet"));
+    assert!(!rig.screen(120, 36).contains("not received yet"));
 
     let mut rig = judged([0.4, 0.1], TdLanding::all(), TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
     rig.finding(0, 0, 0.0, "");

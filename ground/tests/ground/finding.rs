@@ -74,7 +74,7 @@ fn a_held_enter_confirms_nothing_that_the_palette_opened() {
 }
 
 #[test]
-fn the_palette_only_tells_how_to_abort() {
+fn the_palette_only_explains_how_to_abort() {
     let mut rig = powered();
     rig.take_commands();
     choose(&mut rig, "abort");

@@ -50,7 +50,7 @@ fn no_go() -> Rig {
 fn with_events() -> Rig {
     let mut rig = on_the_pad();
     for text in
-        ["self-test passed", "the log runs", "plan: a landing is rehearsed", "igniter closed", "uplink heard"]
+        ["self-test passed", "the log runs", "plan: a landing is rehearsed", "igniter closed", "uplink alive"]
     {
         rig.text(text);
     }
@@ -391,8 +391,8 @@ fn no_key_disarms_in_flight() {
     }
 }
 
-/// A moment of the recorded flight: a station that has heard everything up to it, and the vehicle's
-/// last words.
+/// A moment of the recorded flight: a station that has received everything up to it, and the
+/// vehicle's last words.
 struct Moment {
     rig: Rig,
     phase: TdPhase,

@@ -125,7 +125,7 @@ fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
 
 /// An abort that is begun, and one that is kept for the next station.
 #[test]
-fn a_begun_and_a_kept_abort_can_be_read_at_every_danger_in_every_theme() {
+fn a_begun_and_an_unsent_abort_can_be_read_at_every_danger_in_every_theme() {
     for (danger, rig) in dangers() {
         let mut kept = rig;
         kept.model.link.abort_unsent = true;
