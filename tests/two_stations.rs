@@ -145,7 +145,7 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
 fn the_command_is_taken_over_when_the_commanding_laptop_dies() {
     let mut launch = Launch::armed_by_bob_and_ann();
     launch.ann.wait_for("FLIGHT Bob commands");
-    // While Bob is heard nobody takes it from him.
+    // While Bob's frames arrive, no one takes command from him.
     launch.ann.type_until(b"CTAKE\r", "FLIGHT Bob (254/190) is heard");
     launch.bob.signal(Signal::SIGKILL);
     launch.ann.type_until(b"CTAKE\r", "RANGE SAFETY Ann commands");

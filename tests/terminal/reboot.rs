@@ -52,7 +52,7 @@ fn a_power_cycle_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() 
     rig.terminal.wait_for_end();
 }
 
-/// The vehicle stays switched on: neither its boot nor its clock tells it.
+/// The vehicle stays switched on: neither its boot nor its clock shows it.
 #[test]
 fn a_reset_in_the_countdown_is_an_alarm_and_hides_go_until_somebody_has_seen_it() {
     let mut rig = Rig::with_fault("mk2", "reboot:0.1@pad-armed+7");
