@@ -120,9 +120,9 @@ fn a_station_of_the_crews_page_has_screens() {
 }
 
 #[test]
-fn a_recorded_flight_is_shown_as_the_crews_page_says() {
+fn a_recorded_flight_is_shown_as_on_the_crews_page() {
     let (folder, places) = (tempfile::tempdir().unwrap(), Places::new());
-    // Its frames go to nobody: the log has them all the same.
+    // Its frames have no receiver: the log has them all the same.
     let mut fly = program(Program::OnboardSim);
     fly.args(["fly", "--auto", "--speed", "max", "--mavlink", "udpin:127.0.0.1:0", "--log", "flight.mcap"]);
     assert_eq!(Running::to_end(fly.current_dir(folder.path())).code, Some(0));
@@ -147,7 +147,7 @@ fn the_links_of_the_crews_page_join_vehicle_and_station() {
 
 /// Over a cable: a radio needs minutes for a log.
 #[test]
-fn the_log_is_fetched_as_the_crews_page_says() {
+fn the_log_is_fetched_as_on_the_crews_page() {
     let (folder, places) = (tempfile::tempdir().unwrap(), Places::new());
     let vehicle = landed_vehicle(folder.path(), "mk2", &format!("udpin:{}", places.station), &[]);
     let station = tempfile::tempdir().unwrap();
@@ -193,7 +193,7 @@ fn the_two_people_of_the_crews_page_see_a_vehicle_that_is_ready() {
 }
 
 #[test]
-fn the_book_is_proven_as_the_crews_page_says() {
+fn the_book_is_proven_as_on_the_crews_page() {
     let (folder, places) = (tempfile::tempdir().unwrap(), Places::new());
     let folder = folder.path();
     keygen(folder, "flight.key");

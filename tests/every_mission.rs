@@ -5,7 +5,7 @@ use std::path::Path;
 use e2e::{Program, Running, program};
 use flight::vehicles::mission::BUILTIN;
 
-/// Flies a mission by itself, with telemetry that nobody receives, and shows its log. Of the second
+/// Flies a mission by itself, with telemetry without a receiver, and shows its log. Of the second
 /// seed, in which all stand.
 fn shown(folder: &Path, mission: &str) {
     let log = format!("{mission}.mcap");

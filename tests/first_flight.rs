@@ -30,7 +30,7 @@ fn commands(folder: &Path, radio: &SerialLine) -> Vec<Command> {
 const COUNTDOWN: Duration = Duration::from_secs(20);
 
 #[test]
-fn a_first_flight_goes_as_its_page_says() {
+fn a_first_flight_follows_its_page() {
     let folder = tempfile::tempdir().unwrap();
     let radio = SerialLine::new(57_600);
     let mut commands = commands(folder.path(), &radio);
@@ -49,7 +49,7 @@ fn a_first_flight_goes_as_its_page_says() {
     screen.type_until(b"AARM\r", " ARMED ");
     screen.type_until(b"SSTART\r", "START  commanded");
     // A busy machine may leave the radio silent for a second, which holds the countdown: then it is
-    // started again, and armed, if nobody started it for long.
+    // started again, and armed, if it was not started for long.
     while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
         if screen.window().shows(" disarmed PAD_IDLE") {
             screen.type_until(b"AARM\r", " ARMED ");
@@ -57,7 +57,7 @@ fn a_first_flight_goes_as_its_page_says() {
         screen.type_by_hand(b"SSTART\r");
         // The words of the first start are still there: only the question whether a person typed is
         // waited for.
-        screen.confirm_if_asked("STANDS UNDAMAGED, inside");
+        screen.confirm_if_prompted("STANDS UNDAMAGED, inside");
     }
     screen.wait_for("STANDS UNDAMAGED, inside");
     screen.wait_for("STANDS UNDAMAGED; may be approached");

@@ -32,7 +32,7 @@ fn fact<'a>(info: &'a Ended, word: &str) -> &'a str {
 }
 
 #[test]
-fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
+fn the_stations_record_agrees_with_the_vehicles_log() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let mut ground = Running::start(&mut auto_ground(folder, &["udpin:127.0.0.1:0"]));
@@ -80,7 +80,7 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
         assert!(received.len() >= of_all, "{table}: {} of {}", received.len(), sent.len());
     }
 
-    its_tlog_tells_the_same(folder);
+    its_tlog_reports_the_same(folder);
 }
 
 /// What a station records ten times a second, of the vehicle's state: which of its moments it takes
@@ -88,8 +88,8 @@ fn what_a_station_recorded_agrees_with_the_vehicles_own_log() {
 const STATE: [&str; 8] =
     ["phase", "north_m", "east_m", "altitude_m", "north_m_s", "climb_m_s", "tilt_rad", "turn_rate_rad_s"];
 
-/// The vehicle's state after each frame in a `.tlog` that tells of it, and once before the first.
-fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
+/// The vehicle's state after each frame of a `.tlog` that reports it, and once before the first.
+fn reported_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
     let mut frames = TlogReader::new(std::fs::File::open(tlog).expect("the station has written it"));
     let mut told = ReportedState::default();
     let mut states = Vec::new();
@@ -121,8 +121,8 @@ fn told_by_each_frame(tlog: &Path) -> Vec<[Option<f64>; 8]> {
 
 /// What the station recorded is the vehicle's state after one of the frames in its `.tlog`, and the
 /// later record after the later frame. The vehicle rolls as it falls.
-fn its_tlog_tells_the_same(folder: &Path) {
-    let told = told_by_each_frame(&folder.join("ground.tlog"));
+fn its_tlog_reports_the_same(folder: &Path) {
+    let told = reported_by_each_frame(&folder.join("ground.tlog"));
     let columns = STATE.map(|name| column(&folder.join("ground/telemetry.csv"), name));
     let rows = columns[0].len();
     assert!(rows > 100, "{rows}");
@@ -131,6 +131,6 @@ fn its_tlog_tells_the_same(folder: &Path) {
         let recorded = columns.each_ref().map(|column| column[row].parse::<f64>().ok());
         let after = told[first..].iter().position(|state| *state == recorded);
         // Several records may follow one frame.
-        first += after.unwrap_or_else(|| panic!("row {row}: {recorded:?} was told by no frame"));
+        first += after.unwrap_or_else(|| panic!("row {row}: {recorded:?} was reported by no frame"));
     }
 }

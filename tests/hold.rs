@@ -47,9 +47,9 @@ fn a_silent_uplink_holds_the_countdown() {
     // The last one hangs below a drone.
     for profile in ["mk2", "vlr"] {
         let mut flight = Countdown::of(profile);
-        let heard = wait_for_uplink(&mut flight.ground, |_| true);
-        assert_eq!((heard.target_system, heard.target_component, heard.commands), (255, 190, 1));
-        assert!(heard.accepted_age_ms < 1_000, "{heard:?}");
+        let uplink = wait_for_uplink(&mut flight.ground, |_| true);
+        assert_eq!((uplink.target_system, uplink.target_component, uplink.commands), (255, 190, 1));
+        assert!(uplink.accepted_age_ms < 1_000, "{uplink:?}");
         flight.proxy.impair(Impairment { drops_uplink: true, ..Impairment::default() });
         let held = flight.ground.wait_for_status("a hold", |status| status.hold != TdHold::TD_HOLD_NONE);
         assert_eq!((held.hold, held.phase), (TdHold::TD_HOLD_UPLINK_SILENT, TdPhase::TD_PHASE_PAD_ARMED));
@@ -58,7 +58,7 @@ fn a_silent_uplink_holds_the_countdown() {
         let silent = wait_for_uplink(&mut flight.ground, |uplink| uplink.accepted_age_ms > 3_000);
         assert_eq!(silent.target_system, 255);
 
-        // The vehicle hears the ground again for longer than the countdown, and still holds.
+        // The vehicle receives the ground again for longer than the countdown, and still holds.
         flight.proxy.impair(Impairment::default());
         let later = flight.ground.wait_for_status("some seconds more", |status| {
             assert_eq!((status.phase, status.countdown_ms), (TdPhase::TD_PHASE_PAD_ARMED, i32::MAX));

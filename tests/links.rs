@@ -57,7 +57,7 @@ fn at_4800_baud_they_land_signed() {
 }
 
 #[test]
-fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
+fn over_udp_tcp_and_a_radio_at_once_every_frame_is_received_once() {
     let line = SerialLine::new(57_600);
     let folder = tempfile::tempdir().unwrap();
     let links = [&line.near_link(), "udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"];
@@ -74,7 +74,7 @@ fn over_udp_tcp_and_a_radio_at_once_everything_is_heard_once() {
 }
 
 #[test]
-fn a_ground_commands_only_its_own_one_of_two_rockets_on_one_link() {
+fn a_ground_commands_only_its_vehicle_of_two_rockets_on_one_link() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = auto_ground(folder.path(), &["udpin:127.0.0.1:0"]);
     let mut ground = Running::start(ground.args(["--sysid", "254", "--vehicle-sysid", "2"]));
@@ -142,7 +142,7 @@ fn a_ground_that_restarts_is_answered_again() {
 const PROCESSOR_SHARE_MAX: f64 = 0.25;
 
 /// A serial line is unplugged and plugged in again. The vehicle waits without using the processor,
-/// and is heard again.
+/// and is received again.
 #[test]
 fn a_serial_line_may_be_unplugged_and_plugged_in_again() {
     let folder = tempfile::tempdir().unwrap();

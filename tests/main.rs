@@ -1,6 +1,7 @@
 //! The tests with real processes. `cargo test --test e2e abort` runs one file of them.
 
 mod abort;
+mod addressing;
 mod architecture;
 mod crew;
 mod demo;
@@ -12,7 +13,6 @@ mod hold;
 mod hostile;
 mod links;
 mod logs;
-mod meant;
 mod outside_clients;
 mod pad_check;
 mod pages;

@@ -24,7 +24,7 @@ fn tests_with_other_programs_are_a_separate_step_that_is_documented_and_required
     }
     assert!(read("README.md").contains(STEP), "the README does not name the step");
     assert!(read(".ci/run").lines().any(|line| line == format!("step {STEP}")), "the step is not required");
-    // This bypasses the test's captured output, so that nobody mistakes this run for those tests.
+    // This bypasses the test's captured output, so that this run is not mistaken for those tests.
     // If it fails, there is nothing else to do.
     let _ = writeln!(std::io::stderr(), "NOT RUN: other people's programs against ours; `{STEP}` runs them");
 }

@@ -69,7 +69,7 @@ fn a_crew_checks_its_vehicle_and_then_arms_it() {
     assert_eq!(code, Some(0), "{words}");
 }
 
-/// A closed fin that is stuck closed stands where it is told to: the arming checks pass.
+/// A closed fin that is stuck closed agrees with its command: the arming checks pass.
 #[test]
 fn a_fin_that_is_stuck_closed_is_found_by_the_check_alone() {
     let folder = tempfile::tempdir().unwrap();

@@ -238,7 +238,7 @@ fn the_landing_rates_on_the_pages_are_the_measured_ones() {
 
 /// Every figure of a sentence about rates on the page for the range safety officer.
 #[test]
-fn what_the_safety_page_says_of_landing_rates_agrees_with_the_measured_ones() {
+fn the_landing_rates_of_the_safety_page_agree_with_the_measured_ones() {
     let [field, real] = ["field", "real"].map(|dispersion| rate("mk2", dispersion));
     let safety = prose("docs/safety.md");
     let said: Vec<&str> =

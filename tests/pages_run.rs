@@ -77,7 +77,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const SAID: [(&str, &str); 20] = [
+const COMMANDS: [(&str, &str); 20] = [
     ("onboard-sim fly --start pad --fault abort@descent", "ABORTED, then DOWN UNDER THE PARACHUTE"),
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "touchdown_vertical_m_s"),
@@ -148,9 +148,9 @@ fn run_line(folder: &Path, line: &str) -> Option<String> {
     shell.args(["-c", line]).env("PATH", &path).env("HOME", folder).env_remove("RUST_BACKTRACE");
     let ended = Running::to_end(shell.current_dir(folder));
     // The longest beginning is this line's.
-    let said = SAID.iter().filter(|(begin, _)| format!("{line} ").starts_with(begin));
-    let said = said.max_by_key(|(begin, _)| begin.len());
-    let missing = said.filter(|(_, words)| !ended.output.contains(words));
+    let found = COMMANDS.iter().filter(|(begin, _)| format!("{line} ").starts_with(begin));
+    let found = found.max_by_key(|(begin, _)| begin.len());
+    let missing = found.filter(|(_, words)| !ended.output.contains(words));
     (!has_answered(line, ended.code) || missing.is_some())
         .then(|| format!("{line}\ncode {:?}, does not say {missing:?}\n{}", ended.code, ended.output))
 }
@@ -191,7 +191,7 @@ fn every_exception_and_every_answer_is_of_a_line_of_its_page() {
     };
     let gone: Vec<_> = ELSEWHERE.iter().filter(|(name, begin, _)| !of_page(name, begin)).collect();
     assert!(gone.is_empty(), "not on its page: {gone:?}");
-    let unasked: Vec<_> =
-        SAID.iter().filter(|(begin, _)| !PAGES.iter().any(|name| of_page(name, begin))).collect();
-    assert!(unasked.is_empty(), "on no page: {unasked:?}");
+    let missing: Vec<_> =
+        COMMANDS.iter().filter(|(begin, _)| !PAGES.iter().any(|name| of_page(name, begin))).collect();
+    assert!(missing.is_empty(), "on no page: {missing:?}");
 }

@@ -18,8 +18,8 @@ fn type_line(input: &mut ChildStdin, words: &str) {
     writeln!(input, "{words}").expect("a program that reads its input");
 }
 
-/// A flight that ends under its parachute with a motor that was not lit; in the air, and after it,
-/// its time runs faster.
+/// A flight that ends under its parachute with an unburnt motor; in the air, and after it, its time
+/// runs faster.
 #[test]
 fn a_crew_practises_from_the_start_to_may_be_approached_with_the_pin_in_its_hand() {
     let folder = tempfile::tempdir().expect("a folder");

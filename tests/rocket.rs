@@ -35,9 +35,9 @@ fn the_demonstration_of_the_ground_flies_the_same_mission_from_the_pad() {
     expect_identical_replay(folder.path(), "both.mcap");
 }
 
-/// Nobody armed it, nobody started it: it rises all the same, and comes down under its parachute.
+/// Neither armed nor started, it rises all the same, and comes down under its parachute.
 #[test]
-fn a_lift_off_that_nobody_asked_for_is_flown_to_the_parachute() {
+fn an_uncommanded_lift_off_is_flown_to_the_parachute() {
     let folder = tempfile::tempdir().unwrap();
     let mut ground = BareGround::new();
     let mut command = vehicle(folder.path(), &[&ground.link()]);

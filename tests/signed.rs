@@ -98,7 +98,7 @@ struct TimesyncVehicle {
     socket: UdpSocket,
     encoder: Encoder,
     signing: Signing,
-    asked: i64,
+    requests: i64,
 }
 
 impl TimesyncVehicle {
@@ -106,19 +106,19 @@ impl TimesyncVehicle {
         let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
         socket.connect(ground).unwrap();
         socket.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
-        Self { socket, encoder: Encoder::new(VEHICLE), signing: signing_with_key_in(folder), asked: 0 }
+        Self { socket, encoder: Encoder::new(VEHICLE), signing: signing_with_key_in(folder), requests: 0 }
     }
 
     fn question(&mut self) -> Vec<u8> {
-        self.asked += 1;
-        let sync = TIMESYNC_DATA { tc1: 0, ts1: self.asked, target_system: 0, target_component: 0 };
+        self.requests += 1;
+        let sync = TIMESYNC_DATA { tc1: 0, ts1: self.requests, target_system: 0, target_component: 0 };
         let frame = self.encoder.encode(&MavMessage::TIMESYNC(sync));
         self.signing.sign(&frame, 0, signing_clock()).as_bytes().to_vec()
     }
 
     /// Sends a question and returns whether it is answered at once.
     fn is_answered(&self, question: &[u8]) -> bool {
-        // If nobody is listening yet, either the next send or the next receive reports it.
+        // Without a listener, either the next send or the next receive reports it.
         let _ = self.socket.send(question);
         let mut datagram = [0; 2048];
         let mut framer = Framer::new();
@@ -136,7 +136,7 @@ impl TimesyncVehicle {
             while let Some(frame) = framer.next_frame() {
                 if let Ok(MavMessage::TIMESYNC(sync)) = frame.decode()
                     && sync.tc1 != 0
-                    && sync.ts1 == self.asked
+                    && sync.ts1 == self.requests
                 {
                     return true;
                 }
@@ -145,7 +145,7 @@ impl TimesyncVehicle {
     }
 
     /// Sends new questions until one is answered, and returns that one.
-    fn ask_until_answered(&mut self) -> Vec<u8> {
+    fn request_until_answered(&mut self) -> Vec<u8> {
         for _ in 0..600 {
             let question = self.question();
             if self.is_answered(&question) {
@@ -166,7 +166,7 @@ impl TimesyncVehicle {
                 return;
             }
         }
-        panic!("nobody listens");
+        panic!("no listener");
     }
 }
 
@@ -187,7 +187,7 @@ fn a_frame_that_a_ground_accepted_is_rejected_after_the_ground_was_killed() {
     let mut vehicle = TimesyncVehicle::new(folder.path(), address);
     for _ in 0..3 {
         let station = start();
-        let question = vehicle.ask_until_answered();
+        let question = vehicle.request_until_answered();
         // The station has just acted on it.
         station.signal(Signal::SIGKILL);
         station.wait();
@@ -196,7 +196,7 @@ fn a_frame_that_a_ground_accepted_is_rejected_after_the_ground_was_killed() {
         for _ in 0..10 {
             assert!(!vehicle.is_answered(&question), "a replayed frame was accepted");
         }
-        vehicle.ask_until_answered();
+        vehicle.request_until_answered();
         station.signal(Signal::SIGKILL);
         station.wait();
     }

@@ -77,7 +77,7 @@ impl Launch {
     fn armed_by_bob_and_ann() -> Self {
         let mut launch = Self::new();
         let [ann, bob] = [&mut launch.ann, &mut launch.bob];
-        agreed((bob, b"0AARM\r", "FLIGHT Bob asks to arm"), (ann, b"0ACONFIRM\r", " ARMED "));
+        agreed((bob, b"0AARM\r", "FLIGHT Bob requests to arm"), (ann, b"0ACONFIRM\r", " ARMED "));
         launch.bob.wait_for(" ARMED ");
         launch
     }
@@ -120,17 +120,17 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
     }
     assert!(!shows(&launch.ann, " ARMED "), "one alone has armed");
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
-    agreed((ann, b"0AARM\r", "RANGE SAFETY Ann asks to arm"), (bob, b"0ACONFIRM\r", " ARMED "));
+    agreed((ann, b"0AARM\r", "RANGE SAFETY Ann requests to arm"), (bob, b"0ACONFIRM\r", " ARMED "));
     launch.ann.wait_for(" ARMED ");
     // The start is shared in the same way. Ann is in command, so Bob must tap.
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
-    agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
+    agreed((bob, b"0SSTART\r", "FLIGHT Bob requests to start"), (ann, b"0SCONFIRM\r", " T-"));
     launch.ann.wait_for("no tap of FLIGHT Bob for 1 s");
-    launch.ann.wait_for("start anew");
+    launch.ann.wait_for("start again");
     assert!(shows(&launch.ann, " ARMED "), "a hold does not disarm");
     // Again, with taps until the release.
     let [ann, bob] = [&mut launch.ann, &mut launch.bob];
-    agreed((bob, b"0SSTART\r", "FLIGHT Bob asks to start"), (ann, b"0SCONFIRM\r", " T-"));
+    agreed((bob, b"0SSTART\r", "FLIGHT Bob requests to start"), (ann, b"0SCONFIRM\r", " T-"));
     let released = (0..60).any(|_| {
         launch.bob.type_bytes(b"T");
         let flies = |window: &e2e::Window| window.shows(" AERO_DESCENT ").then_some(());
@@ -145,13 +145,13 @@ fn one_person_alone_neither_arms_nor_starts_and_two_fly_with_taps() {
 fn the_command_is_taken_over_when_the_commanding_laptop_dies() {
     let mut launch = Launch::armed_by_bob_and_ann();
     launch.ann.wait_for("FLIGHT Bob commands");
-    // While Bob is heard nobody takes it from him.
+    // While Bob's frames arrive, no one takes command from him.
     launch.ann.type_until(b"CTAKE\r", "FLIGHT Bob (254/190) is heard");
     launch.bob.signal(Signal::SIGKILL);
     launch.ann.type_until(b"CTAKE\r", "RANGE SAFETY Ann commands");
     assert!(shows(&launch.ann, " ARMED "), "the vehicle stays armed");
     // One alone still does not start it.
-    launch.ann.type_until(b"0SSTART\r", "RANGE SAFETY Ann asks to start");
+    launch.ann.type_until(b"0SSTART\r", "RANGE SAFETY Ann requests to start");
     assert!(!shows(&launch.ann, "countdown runs"));
     launch.ann.type_until(b"D\r", "disarmed PAD_IDLE");
 }

@@ -108,7 +108,7 @@ fn two_vehicles_at_one_station_get_nothing_but_an_abort() {
     screen.wait_for("observed yes");
     // The events of both vehicles push it off the few rows of the pad's page.
     screen.type_bytes(b"6");
-    screen.wait_for("ABORT goes to every vehicle that is heard under id 1");
+    screen.wait_for("ABORT goes to every vehicle received under id 1");
     for mut vehicle in vehicles {
         vehicle.wait_for_line("ABORT");
         vehicle.signal(Signal::SIGTERM);
@@ -133,8 +133,8 @@ fn a_second_vehicle_does_not_hide_a_countdown_which_its_station_holds() {
     screen.wait_until("two vehicles and the one that is armed", |window| {
         let rows = window.rows();
         assert!(!window.shows("REBOOTED") && !rows[1].contains(" disarmed "), "{rows:?}");
-        // The station holds as soon as it hears both, so the countdown may stand on no screen with
-        // two vehicles.
+        // The station holds as soon as it receives both, so the countdown may stand on no screen
+        // with two vehicles.
         (rows[0].contains("TWO VEHICLES under id 1") && rows[1].starts_with(" ARMED ")).then_some(())
     });
     first.wait_for_line("hold");
@@ -169,10 +169,11 @@ fn two_vehicles_with_one_boot_number_are_two() {
 /// What a station that listens commands goes to the vehicle that it shows, and an abort to
 /// everybody.
 #[test]
-fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
+fn commands_go_only_to_the_origin_of_the_shown_vehicle() {
     let folder = tempfile::tempdir().unwrap();
     let (mut screen, port) = listening(folder.path());
-    // It beats like one of ours, but has told no status: nothing shows that it is another one.
+    // Its heartbeat is like ours, but it has reported no status: no evidence that it is another
+    // one.
     let other = Beating::start(
         HEARTBEAT_DATA {
             custom_mode: 1,
@@ -198,7 +199,7 @@ fn commands_go_only_to_where_the_shown_vehicle_is_heard() {
 
 /// It answers TIMESYNC, so that its uplink is proven; its mode ACRO has the number of PAD_IDLE.
 #[test]
-fn a_copter_is_not_armed_and_an_abort_of_it_asks_first() {
+fn a_copter_is_not_armed_and_an_abort_of_it_is_confirmed_first() {
     let folder = tempfile::tempdir().unwrap();
     let (mut screen, port) = listening(folder.path());
     let copter = Beating::start(
@@ -267,7 +268,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
     bob_at_ann_s.type_until(b"0AARM\r", "this screen cannot arm: this station signs as Ann");
     for _ in 0..10 {
         bob.type_by_hand(b"0AARM\r");
-        let asks = |window: &e2e::Window| window.shows("FLIGHT Bob asks to arm").then_some(());
+        let asks = |window: &e2e::Window| window.shows("FLIGHT Bob requests to arm").then_some(());
         if ann.wait_within(Duration::from_secs(3), asks).is_none() {
             continue;
         }
@@ -291,7 +292,7 @@ fn nobody_is_two_people_through_a_screen_of_the_other_one_s_station() {
 
 /// The daemon that armed the vehicle is killed under its screen.
 #[test]
-fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_until_it_is_cancelled() {
+fn a_screen_whose_daemon_was_killed_claims_nothing_and_stores_an_unsent_abort_until_it_is_cancelled() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = vehicle(folder.path(), &["udpin:127.0.0.1:0"]);
     let mut vehicle = Running::start(command.args(["--stay", "--mission", "mk2"]));
@@ -301,7 +302,7 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     daemon.wait_for_line("PAD_IDLE");
     let mut screen = Terminal::start(&ground(folder.path(), &["attach", "--operator", "ann"]), SIZE, false);
     screen.wait_for("every arming check passes");
-    screen.type_until(b"0AARM\r", "armed, says HEARTBEAT");
+    screen.type_until(b"0AARM\r", "armed (HEARTBEAT)");
     daemon.signal(Signal::SIGKILL);
     daemon.wait();
     screen.wait_until("that the station is gone, in every line", |window| {
@@ -330,10 +331,10 @@ fn a_screen_whose_daemon_was_killed_claims_nothing_and_keeps_an_unsent_abort_unt
     assert!(!output.contains("ABORT"), "{output}");
 }
 
-/// The vehicle accepts both: it is so. A station that has heard before its Enter that it is armed
-/// sends nothing, and says so.
+/// The vehicle accepts both, as it must. A station that has received before its Enter that it is
+/// armed sends nothing, and says so.
 #[test]
-fn two_stations_that_arm_at_once_are_both_told() {
+fn both_of_two_stations_that_arm_at_once_get_an_answer() {
     let folder = tempfile::tempdir().unwrap();
     let mut vehicle = Running::start(vehicle(folder.path(), &["udpin:127.0.0.1:0"]).arg("--stay"));
     let link = vehicle.udp_link();
@@ -353,7 +354,7 @@ fn two_stations_that_arm_at_once_are_both_told() {
     }
     for screen in &mut both {
         // On a busy machine keys arrive together.
-        screen.confirm_if_asked(" ARMED ");
+        screen.confirm_if_prompted(" ARMED ");
     }
     for screen in &both {
         screen.wait_until("an answer to ARM", |window| {
@@ -369,7 +370,7 @@ fn two_stations_that_arm_at_once_are_both_told() {
 /// The one that armed and started is killed in the countdown; the other one's heartbeats, under the
 /// same id, do not stand in for it.
 #[test]
-fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_alive() {
+fn a_second_station_under_the_same_id_neither_commands_nor_sustains_a_countdown() {
     let folder = tempfile::tempdir().unwrap();
     let of = concat!(env!("CARGO_MANIFEST_DIR"), "/../onboard-sim/flight/vehicles/missions/mk2.toml");
     let profile = std::fs::read_to_string(of).unwrap();
@@ -383,7 +384,7 @@ fn a_second_station_under_the_same_id_neither_commands_nor_keeps_a_countdown_ali
         || Terminal::start(&ground(folder.path(), &["--connect", &link, "--log", "none"]), SIZE, false);
     let mut one = station();
     one.wait_for("every arming check passes");
-    one.type_until(b"0AARM\r", "armed, says HEARTBEAT");
+    one.type_until(b"0AARM\r", "armed (HEARTBEAT)");
     one.type_until(b"0SSTART\r", "hold until T-2");
     one.wait_for("armed here");
     let mut other = station();

@@ -27,8 +27,8 @@ Examples:
 /// Without --connect it always flies a demonstration: a simulated vehicle in this process, from its
 /// pad to touchdown, with real MAVLink over a loopback UDP socket. On a terminal it shows the full
 /// screen (? lists the keys). Without a terminal it prints one line per event and the landing
-/// verdict; the exit code tells how the flight ended. Colours, voice and bell stand in the settings
-/// (`ground config example`).
+/// verdict; the exit code reports how the flight ended. Colours, voice and bell stand in the
+/// settings (`ground config example`).
 #[derive(Debug, Clone, Parser)]
 #[command(name = "ground", version, after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"), args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -163,7 +163,7 @@ pub struct Flags {
     #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub log: Option<LogChoice>,
 
-    /// Send every frame that is heard on to udpout:HOST:PORT, for a map, an antenna tracker or an
+    /// Forward every received frame to udpout:HOST:PORT, for a map, an antenna tracker or an
     /// overlay; may be given more than once. One way: what comes back is never read.
     #[arg(long, value_name = "LINK", value_parser = listener, help_heading = "Station")]
     pub forward: Vec<String>,

@@ -42,7 +42,7 @@ impl DemoOptions {
     pub fn load(args: &StationArgs) -> anyhow::Result<Self> {
         let mut flight = fly::load_flight(args.mission())?.starting_at(args.start)?;
         flight.recipe.seed = args.seed.unwrap_or(DEMO_SEED);
-        // Nobody has named a mission, so nobody waits for the countdown that it says.
+        // Without a named mission, the countdown that it sets is not waited for.
         if args.flags.mission.is_none() {
             flight.recipe = flight.recipe.counting_down(QUICK_COUNTDOWN_S)?;
         }

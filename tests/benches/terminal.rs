@@ -35,7 +35,7 @@ const GIVEN_UP_AFTER: Duration = Duration::from_secs(5);
 /// A way to type the chord that aborts.
 struct Hand {
     name: &'static str,
-    tells_repeats: bool,
+    reports_repeats: bool,
     keys: [&'static [u8]; 2],
     /// The least time between the two keys.
     pause: Duration,
@@ -44,38 +44,38 @@ struct Hand {
 const HANDS: [Hand; 4] = [
     Hand {
         name: "any terminal, Ctrl-X Enter",
-        tells_repeats: false,
+        reports_repeats: false,
         keys: [b"\x18", b"\r"],
         pause: Duration::from_millis(40),
     },
     Hand {
         name: "any terminal, Ctrl-X twice",
-        tells_repeats: false,
+        reports_repeats: false,
         keys: [b"\x18", b"\x18"],
         pause: Duration::from_millis(150),
     },
     // Ctrl-X as kitty's protocol encodes it; Enter is unchanged.
     Hand {
-        name: "repeats told, Ctrl-X Enter",
-        tells_repeats: true,
+        name: "repeats reported, Ctrl-X Enter",
+        reports_repeats: true,
         keys: [b"\x1b[120;5u", b"\r"],
         pause: Duration::from_millis(40),
     },
     Hand {
-        name: "repeats told, Ctrl-X twice",
-        tells_repeats: true,
+        name: "repeats reported, Ctrl-X twice",
+        reports_repeats: true,
         keys: [b"\x1b[120;5u", b"\x1b[120;5u"],
         pause: Duration::from_millis(150),
     },
 ];
 
-fn ground(folder: &tempfile::TempDir, tells_repeats: bool) -> Terminal {
+fn ground(folder: &tempfile::TempDir, reports_repeats: bool) -> Terminal {
     let mut command = program(Program::Ground);
     command
         .args(["--connect", "udpin:127.0.0.1:0", "--log", "ground.mcap"])
         .env("XDG_RUNTIME_DIR", folder.path())
         .current_dir(folder.path());
-    Terminal::start(&command, SIZE, tells_repeats)
+    Terminal::start(&command, SIZE, reports_repeats)
 }
 
 /// Sends what a landing vehicle sends, until `stop` is set.
@@ -141,7 +141,7 @@ fn wait_for_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
             let Some(request) = CommandRequest::from_frame(&frame) else { continue };
             if request.command == MavCmd::MAV_CMD_DO_FLIGHTTERMINATION as u16 {
                 let answer = CommandAnswer::to(&request, MavResult::MAV_RESULT_ACCEPTED);
-                // Nobody counts its sequence numbers.
+                // Its sequence numbers are not counted.
                 if let Some(frame) = answer.encode(&mut Encoder::new(VEHICLE)) {
                     socket.send_to(frame.as_bytes(), from)?;
                 }
@@ -155,7 +155,7 @@ fn wait_for_abort(socket: &UdpSocket) -> Result<Option<Instant>, Failure> {
 /// was held, and then no abort is sent.
 fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
     let folder = tempfile::tempdir()?;
-    let mut terminal = ground(&folder, hand.tells_repeats);
+    let mut terminal = ground(&folder, hand.reports_repeats);
     let port = terminal.bound_port(Bound::Udp);
     let socket = UdpSocket::bind("127.0.0.1:0")?;
     let stop = Arc::new(AtomicBool::new(false));
@@ -166,7 +166,7 @@ fn abort_latency(hand: &Hand) -> Result<Vec<Duration>, Failure> {
             .name("vehicle".to_owned())
             .spawn(move || send_telemetry(&socket, to, &stop))?
     };
-    // The ground hears the vehicle and draws it for a while.
+    // The ground receives the vehicle and draws it for a while.
     std::thread::sleep(Duration::from_secs(3));
     let mut latencies = Vec::new();
     for trial in 0..TRIALS {

@@ -36,7 +36,7 @@ pub struct BareGround {
     framer: Framer,
     encoder: Encoder,
     beats_at: Instant,
-    /// Told in its heartbeats; 0 for none, as other people's ground stations have.
+    /// Sent in its heartbeats; 0 for none, as other people's ground stations have.
     pub session: u32,
     /// The texts that the vehicle has sent.
     pub texts: Vec<String>,
@@ -92,7 +92,7 @@ impl BareGround {
                 }
             }
             let wait = left(deadline);
-            assert!(!wait.is_zero(), "no {what} within the time limit; heard: {:?}", self.texts);
+            assert!(!wait.is_zero(), "no {what} within the time limit; received: {:?}", self.texts);
             self.beat_if_due();
             // A time limit of zero would mean no limit.
             let wait = wait.min(left(self.beats_at)).max(Duration::from_millis(1));
@@ -162,7 +162,7 @@ impl BareGround {
         self.send(&frame);
     }
 
-    /// A ground station that speaks to the vehicle at this address before it has heard it.
+    /// A ground station that sends to the vehicle at this address before it has received it.
     pub fn to(vehicle: SocketAddr) -> Self {
         Self { vehicle: Some(vehicle), ..Self::new() }
     }
@@ -179,7 +179,7 @@ impl BareGround {
     }
 
     fn send(&mut self, frame: &Frame) {
-        let vehicle = self.vehicle.expect("a vehicle that has been heard");
+        let vehicle = self.vehicle.expect("a received vehicle");
         self.socket.send_to(frame.as_bytes(), vehicle).expect("sent");
     }
 }

@@ -22,7 +22,7 @@ pub fn program(program: Program) -> Command {
     Command::new(built().join(name))
 }
 
-/// The folder with the programs of this build. Cargo tells a test only the paths of its own
+/// The folder with the programs of this build. Cargo gives a test only the paths of its own
 /// package's programs, so they are built here, with the profile and into the target folder of the
 /// test itself.
 fn built() -> &'static PathBuf {

@@ -102,7 +102,7 @@ fn raw_terminal() -> (File, OwnedFd) {
     (File::from(pair.master), pair.slave)
 }
 
-/// Waits until a port takes bytes. A port that nobody reads is full after some thousand; returns
+/// Waits until a port takes bytes. A port without a reader is full after some thousand; returns
 /// `false` if the line is cut then.
 fn takes_bytes(port: &File, cut: &AtomicBool) -> bool {
     while !cut.load(Ordering::Relaxed) {

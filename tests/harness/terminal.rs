@@ -24,7 +24,7 @@ use crate::window::Window;
 const REPEATS_QUERY: &[u8] = b"\x1b[?u";
 /// The answer of a terminal that knows the protocol and has no flag set.
 const REPEATS_ANSWER: &[u8] = b"\x1b[?0u";
-/// Every terminal answers this when it is asked what it is; it ends the wait for the answer above.
+/// Every terminal answers a query of its type with this; it ends the wait for the answer above.
 const DEVICE_ATTRIBUTES: &[u8] = b"\x1b[?62c";
 
 /// The program asks with this whether the terminal still takes what is written, and any terminal
@@ -67,10 +67,10 @@ impl Shown {
 }
 
 impl Terminal {
-    /// Starts a program on a terminal of this size (columns, rows). `tells_repeats` says whether
+    /// Starts a program on a terminal of this size (columns, rows). `reports_repeats` is whether
     /// the terminal distinguishes key repeats from presses. `setsid` (util-linux) makes it the
     /// program's controlling terminal.
-    pub fn start(command: &Command, (columns, rows): (u16, u16), tells_repeats: bool) -> Self {
+    pub fn start(command: &Command, (columns, rows): (u16, u16), reports_repeats: bool) -> Self {
         // Other programs do not inherit it: a copy in another test's program would keep the
         // terminal open.
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
@@ -110,7 +110,7 @@ impl Terminal {
         let (pipe, filled) = (keyboard.try_clone().expect("a descriptor"), Arc::clone(&shown));
         std::thread::Builder::new()
             .name("terminal window".to_owned())
-            .spawn(move || fill_window(pipe, &filled, tells_repeats))
+            .spawn(move || fill_window(pipe, &filled, reports_repeats))
             .expect("a thread");
         Self { child, keyboard, shown, modes }
     }
@@ -138,11 +138,12 @@ impl Terminal {
     }
 
     /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine
-    /// keys may arrive together, and the program asks whether a person typed them: it is told so.
+    /// keys may arrive together, and the program prompts whether a person typed them: this confirms
+    /// it.
     pub fn type_until(&mut self, keys: &[u8], words: &str) -> usize {
         for typed in 1..=20 {
             self.type_by_hand(keys);
-            self.confirm_if_asked(words);
+            self.confirm_if_prompted(words);
             if self.wait_within(RETYPE_AFTER, |window| window.shows(words).then_some(())).is_some() {
                 return typed;
             }
@@ -151,17 +152,17 @@ impl Terminal {
     }
 
     /// Waits until these words are shown, or the question whether a person typed the keys, and
-    /// answers the question. Returns whether it was asked.
-    pub fn confirm_if_asked(&mut self, words: &str) -> bool {
-        let asked = self.wait_within(RETYPE_AFTER, |window| {
-            let asked = window.shows(HURRIED_QUESTION);
-            (asked || window.shows(words)).then_some(asked)
+    /// confirms the prompt. Returns whether there was one.
+    pub fn confirm_if_prompted(&mut self, words: &str) -> bool {
+        let prompted = self.wait_within(RETYPE_AFTER, |window| {
+            let prompted = window.shows(HURRIED_QUESTION);
+            (prompted || window.shows(words)).then_some(prompted)
         });
-        if asked == Some(true) {
+        if prompted == Some(true) {
             pause(READING_TIME);
             self.type_bytes(b"\x19");
         }
-        asked == Some(true)
+        prompted == Some(true)
     }
 
     /// Types these keys by hand over a connection that delivers them in pieces of these lengths,
@@ -188,7 +189,7 @@ impl Terminal {
         }
     }
 
-    /// Pastes a text, in brackets if the program has asked for them, as terminals do.
+    /// Pastes a text, in brackets if the program has requested them, as terminals do.
     pub fn paste(&mut self, text: &str) {
         let typed = text.replace('\n', "\r");
         if self.window().has_bracketed_paste() {
@@ -312,18 +313,18 @@ fn window_size((columns, rows): (u16, u16)) -> Winsize {
 }
 
 /// Processes the program's output until its end, and answers as a terminal does.
-fn fill_window(mut pipe: File, shown: &Shown, tells_repeats: bool) {
+fn fill_window(mut pipe: File, shown: &Shown, reports_repeats: bool) {
     let mut buffer = [0; 16 * 1024];
     // A question arrives in one piece, at most together with a frame.
     while let Ok(length @ 1..) = pipe.read(&mut buffer) {
         drop(shown.reading.lock());
         shown.lock().take(&buffer[..length]);
         shown.changed.notify_all();
-        let asked =
+        let queries =
             |query: &[u8]| buffer[..length].windows(query.len()).filter(|bytes| *bytes == query).count();
-        let mut answers = STATUS_ANSWER.repeat(asked(STATUS_QUERY));
-        if asked(REPEATS_QUERY) > 0 {
-            answers.extend(if tells_repeats { REPEATS_ANSWER } else { &[] });
+        let mut answers = STATUS_ANSWER.repeat(queries(STATUS_QUERY));
+        if queries(REPEATS_QUERY) > 0 {
+            answers.extend(if reports_repeats { REPEATS_ANSWER } else { &[] });
             answers.extend(DEVICE_ATTRIBUTES);
         }
         if pipe.write_all(&answers).is_err() {

@@ -118,7 +118,7 @@ impl UdpProxy {
 
     /// Sends a datagram to the ground as if it came from the vehicle.
     pub fn send_to_ground(&self, datagram: &[u8]) {
-        let ground = lock(&self.state).ground.expect("a ground that has been heard");
+        let ground = lock(&self.state).ground.expect("a received ground");
         self.to_ground.send_to(datagram, ground).expect("sent");
     }
 

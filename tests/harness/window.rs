@@ -1,10 +1,10 @@
-//! What a terminal's window shows, and what the program asked the terminal to do.
+//! The content of a terminal's window, and the program's requests to the terminal.
 
 use std::num::NonZeroU16;
 
 /// A window's cells and every byte that was written to it.
 pub struct Window {
-    parser: vt100::Parser<Asked>,
+    parser: vt100::Parser<Requests>,
     bytes: Vec<u8>,
     /// This many of the bytes have been processed.
     shown: usize,
@@ -18,14 +18,14 @@ const SHOWN_INSTEAD: &[u8] = b"?";
 
 /// What a program can ask a terminal to do besides showing cells.
 #[derive(Debug, Default)]
-struct Asked {
+struct Requests {
     bells: usize,
     titles: usize,
     clipboard: usize,
     resizes: usize,
 }
 
-impl vt100::Callbacks for Asked {
+impl vt100::Callbacks for Requests {
     fn audible_bell(&mut self, _: &mut vt100::Screen) {
         self.bells += 1;
     }
@@ -54,7 +54,7 @@ impl vt100::Callbacks for Asked {
 impl Window {
     pub(crate) fn new((columns, rows): (u16, u16)) -> Self {
         let (rows, columns) = cells((columns, rows));
-        let parser = vt100::Parser::new_with_callbacks(rows, columns, 0, Asked::default());
+        let parser = vt100::Parser::new_with_callbacks(rows, columns, 0, Requests::default());
         Self { parser, bytes: Vec::new(), shown: 0, closed: false }
     }
 
@@ -115,11 +115,11 @@ impl Window {
         self.parser.callbacks().bells
     }
 
-    /// How often the program asked for a title, the clipboard or another size, which it should
+    /// How often the program requested a title, the clipboard or another size, which it should
     /// never do.
     pub fn forbidden_requests(&self) -> usize {
-        let asked = self.parser.callbacks();
-        asked.titles + asked.clipboard + asked.resizes
+        let requests = self.parser.callbacks();
+        requests.titles + requests.clipboard + requests.resizes
     }
 
     /// Whether a program uses the alternate screen or hides the cursor.
@@ -127,7 +127,7 @@ impl Window {
         self.parser.screen().alternate_screen() || self.parser.screen().hide_cursor()
     }
 
-    /// Whether a program has asked for brackets around pasted text.
+    /// Whether a program has requested brackets around pasted text.
     pub fn has_bracketed_paste(&self) -> bool {
         self.parser.screen().bracketed_paste()
     }

@@ -118,7 +118,7 @@ fn send_all(target: SocketAddr, kind: Traffic, stop: &AtomicBool, sent: &AtomicU
 #[derive(Debug, Clone, Copy, Default)]
 struct Counted {
     heartbeats: u32,
-    asked: u32,
+    requests: u32,
     answered: u32,
     /// The vehicle's clock at its first answer and at its last, ns.
     clock_ns: Option<(i64, i64)>,
@@ -143,7 +143,7 @@ struct TimedGround {
     /// When the vehicle's last HEARTBEAT arrived, and the longest time between two.
     beat_at: Instant,
     worst_beat: Duration,
-    /// The same for the answers to questions that are asked ten times a second.
+    /// The same for the answers to requests that arrive ten times a second.
     answer_at: Instant,
     worst_answer: Duration,
     counted: Counted,
@@ -197,15 +197,15 @@ impl TimedGround {
     /// Sends as a ground does and listens, until this time or until it is done.
     fn run_until(&mut self, until: Instant, mut done: impl FnMut(&Self) -> bool) {
         let mut datagram = [0; 2048];
-        let mut asked_at: Option<Instant> = None;
+        let mut requested_at: Option<Instant> = None;
         while now() < until && !done(self) {
             if self.heartbeat_sent_at.elapsed() >= Duration::from_secs(1) {
                 self.heartbeat_sent_at = now();
                 self.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
             }
-            if asked_at.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
-                asked_at = Some(now());
-                self.counted.asked += 1;
+            if requested_at.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
+                requested_at = Some(now());
+                self.counted.requests += 1;
                 let Address { system_id: target_system, component_id: target_component } = VEHICLE;
                 self.send(&MavMessage::TIMESYNC(TIMESYNC_DATA {
                     tc1: 0,
@@ -251,7 +251,7 @@ impl TimedGround {
         }
     }
 
-    /// Waits until the vehicle hears and is heard; returns how long that took. Delays before that
+    /// Waits until both directions of the link work; returns how long that took. Delays before that
     /// do not count.
     fn wait_until_connected(&mut self, within: Duration) -> Duration {
         let began = now();
@@ -324,10 +324,10 @@ fn check_abort(attempt: &Attempt, case: &str) {
 /// A heartbeat in each second of the vehicle's clock, also if the machine is so busy that they come
 /// late. The kernel's queue may lose single questions, but not most.
 fn check_counted(attempt: &Attempt, case: &str) {
-    let Counted { heartbeats, asked, answered, .. } = attempt.counted;
+    let Counted { heartbeats, requests, answered, .. } = attempt.counted;
     let whole_seconds = attempt.counted.vehicle_s().floor();
     assert!(f64::from(heartbeats) >= whole_seconds, "{case}: a heartbeat is missing: {attempt:?}");
-    assert!(whole_seconds > 1.0 && 2 * answered > asked, "{case}: answers are missing: {attempt:?}");
+    assert!(whole_seconds > 1.0 && 2 * answered > requests, "{case}: answers are missing: {attempt:?}");
 }
 
 /// HEARTBEAT is sent once a second and may be half a second late, and not five answers in a row are

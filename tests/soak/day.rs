@@ -17,7 +17,7 @@ use sim::wire::fly::load_flight;
 use sim::wire::vehicle::Vehicle;
 
 use crate::footprint::GROWTH_MAX_BYTES;
-use crate::{Failure, say};
+use crate::{Failure, print_line};
 
 const HOUR: Duration = Duration::from_hours(1);
 const FRAME: Duration = Duration::from_millis(5);
@@ -36,7 +36,9 @@ pub(crate) fn day(hours: u32) -> Result<Vec<String>, Failure> {
         after_hours.push(resident_bytes(std::process::id()).unwrap_or(0));
     }
     let (third, last) = (after_hours.get(2), after_hours.last());
-    say(&format!("{hours} simulated hours, {landed} landed; resident after each, bytes: {after_hours:?}"))?;
+    print_line(&format!(
+        "{hours} simulated hours, {landed} landed; resident after each, bytes: {after_hours:?}"
+    ))?;
     let mut wrong = Vec::new();
     if let (Some(third), Some(last)) = (third, last)
         && *last > third + GROWTH_MAX_BYTES
@@ -44,7 +46,7 @@ pub(crate) fn day(hours: u32) -> Result<Vec<String>, Failure> {
         wrong.push(format!("the day's memory grew from {third} to {last} bytes"));
     }
     if landed < hours {
-        wrong.push(format!("{landed} of {hours} vehicles have landed and told so"));
+        wrong.push(format!("{landed} of {hours} vehicles have landed and reported it"));
     }
     Ok(wrong)
 }

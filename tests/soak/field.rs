@@ -9,7 +9,7 @@ use protocol::dialect::{MavMessage, TD_LANDING_VERDICT_DATA};
 use protocol::frame::Framer;
 
 use crate::footprint::{HISTORY_BYTES_H, Watched};
-use crate::{Failure, KEY, rest, say};
+use crate::{Failure, KEY, print_line, rest};
 
 const LOG: &str = "station.mcap";
 
@@ -101,7 +101,7 @@ impl Field {
             terminal.wait_for("every arming check passes");
         }
         screen.type_until(b"AARM\r", " ARMED ");
-        screen.wait_for("✓ armed, says HEARTBEAT");
+        screen.wait_for("✓ armed (HEARTBEAT)");
         screen.type_until(b"SSTART\r", "START  commanded");
         vehicle.wait_for_line("to AERO_DESCENT");
         self.proxy.impair(impairment);
@@ -139,7 +139,7 @@ impl Field {
             return Err(format!("{log}: {}", verified.output).into());
         }
         std::fs::remove_file(self.folder.join(&log))?;
-        say(&format!("flight {number}, from the {start}, {link}: {}", how.trim()))
+        print_line(&format!("flight {number}, from the {start}, {link}: {}", how.trim()))
     }
 
     /// Ends the station, and checks that its log holds every flight.
@@ -152,13 +152,13 @@ impl Field {
             let told =
                 Running::to_end(program(Program::Replay).args(command).arg(LOG).current_dir(&self.folder));
             let command = command.join(" ");
-            say(&format!("replay {command} {LOG}\n{}", told.output))?;
+            print_line(&format!("replay {command} {LOG}\n{}", told.output))?;
             if told.code != Some(0) {
                 wrong.push(format!("replay {command} {LOG} ended with {:?}", told.code));
             }
         }
         let verdicts = verdicts_in(&self.folder.join(LOG))?;
-        say(&format!(
+        print_line(&format!(
             "{} flights, {verdicts} verdicts in the log; the station ended with {:?}",
             self.flights, ended.code
         ))?;

@@ -33,17 +33,17 @@ pub(crate) struct Watched {
     process: u32,
     log: Option<PathBuf>,
     /// What it may grow by in an hour, bytes, because it keeps something on purpose.
-    keeps_bytes_h: u64,
+    retained_bytes_h: u64,
     samples: Vec<Footprint>,
 }
 
 impl Watched {
     pub(crate) fn new(name: &'static str, process: u32) -> Self {
-        Self { name, process, log: None, keeps_bytes_h: 0, samples: Vec::new() }
+        Self { name, process, log: None, retained_bytes_h: 0, samples: Vec::new() }
     }
 
-    pub(crate) fn keeping(self, keeps_bytes_h: u64) -> Self {
-        Self { keeps_bytes_h, ..self }
+    pub(crate) fn keeping(self, retained_bytes_h: u64) -> Self {
+        Self { retained_bytes_h, ..self }
     }
 
     pub(crate) fn with_log(self, log: PathBuf) -> Self {
@@ -76,7 +76,7 @@ impl Watched {
                 self.samples.len()
             ));
         }
-        let kept_bytes = self.keeps_bytes_h * third as u64 * SAMPLE_EVERY.as_secs() / 3600;
+        let kept_bytes = self.retained_bytes_h * third as u64 * SAMPLE_EVERY.as_secs() / 3600;
         if memory[2] > memory[1] + GROWTH_MAX_BYTES + kept_bytes {
             wrong.push(format!("{}: memory grew from {} to {} bytes", self.name, memory[1], memory[2]));
         }

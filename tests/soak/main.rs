@@ -1,5 +1,5 @@
 //! A simulated day and two real hours of a launch site: a station with three screens and a flight
-//! every few minutes, and beside it a pad that nobody leaves. Links come and go, a disk fills, a
+//! every few minutes, and beside it a pad without a flight. Links come and go, a disk fills, a
 //! clock steps, programs stop and continue. Memory, descriptors, threads and logs must stay flat,
 //! and nothing may be lost that was promised.
 //!
@@ -59,15 +59,15 @@ fn main() -> Result<(), Failure> {
     wrong.extend(field.close()?);
     wrong.extend(pad.close()?);
 
-    say("| process | memory, MiB | descriptors | threads | log grew by, MB |\n|---|---|---|---|---|")?;
+    print_line("| process | memory, MiB | descriptors | threads | log grew by, MB |\n|---|---|---|---|---|")?;
     for process in watched.lock().unwrap_or_else(PoisonError::into_inner).iter() {
         let (row, problems) = process.judge(samples);
-        say(&row)?;
+        print_line(&row)?;
         wrong.extend(problems);
     }
-    say(&format!("{samples} samples; medians of each third of the run"))?;
+    print_line(&format!("{samples} samples; medians of each third of the run"))?;
     if wrong.is_empty() {
-        return say(&format!(
+        return print_line(&format!(
             "{hours} simulated hours, {minutes} minutes: flat, and nothing lost that was promised"
         ));
     }
@@ -110,7 +110,7 @@ pub(crate) fn rest(time: Duration) {
     std::thread::sleep(time);
 }
 
-pub(crate) fn say(line: &str) -> Result<(), Failure> {
+pub(crate) fn print_line(line: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{line}")?;
     Ok(out.flush()?)

@@ -1,4 +1,4 @@
-//! A pad that nobody leaves: one vehicle and one station that never fly, while the clock of the
+//! A pad without a flight: one vehicle and one station that never fly, while the clock of the
 //! laptop steps, the disk fills, the link goes and programs stop for a while.
 
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use e2e::{Impairment, Program, Running, Signal, Terminal, UdpProxy, program};
 
 use crate::footprint::{HISTORY_BYTES_H, LOG_INDEX_BYTES_H, Watched};
-use crate::{Failure, KEY, rest, say};
+use crate::{Failure, KEY, print_line, rest};
 
 /// The disk of the station's log; it is full after a quarter of an hour or so.
 const DISK: &str = "size=1m";
@@ -98,7 +98,7 @@ impl Pad {
             },
             Event::NoLink => {
                 self.proxy.impair(Impairment { drops_all: true, ..Impairment::default() });
-                self.screen.wait_for("LINK LOST: the vehicle is not heard");
+                self.screen.wait_for("LINK LOST: no telemetry");
                 self.proxy.impair(Impairment::default());
                 "no link".to_owned()
             }
@@ -114,26 +114,26 @@ impl Pad {
         self.expect_both_ways()?;
         let failed = self.screen.window().shows("LOG FAILED");
         self.disk_was_full |= failed;
-        say(&format!("pad: {what}{}", if failed { ", and the log's disk is full" } else { "" }))
+        print_line(&format!("pad: {what}{}", if failed { ", and the log's disk is full" } else { "" }))
     }
 
-    /// An abort is still possible: it is the last thing that the pad is asked for.
+    /// An abort is still possible: it is the last request to the pad.
     pub(crate) fn close(mut self) -> Result<Vec<String>, Failure> {
         self.screen.type_bytes(b"\x18\r");
         self.screen.wait_for_fact("ABORT", "observed yes");
         let log = format!("/proc/{}/cwd/disk/station.mcap", self.station.pid());
         let info = Running::to_end(program(Program::Replay).args(["info", &log]));
-        say(&format!("aborted; replay info of the log on the full disk\n{}", info.output))?;
+        print_line(&format!("aborted; replay info of the log on the full disk\n{}", info.output))?;
         let mut wrong = Vec::new();
         if !self.disk_was_full {
-            wrong.push("nobody said that the pad's disk is full; it takes a quarter of an hour".to_owned());
+            wrong.push("the pad's full disk was not reported; it takes a quarter of an hour".to_owned());
         }
         if info.code != Some(0) {
             wrong.push(format!("the log on the full disk cannot be read: {:?}", info.code));
         }
         self.station.signal(Signal::SIGTERM);
         let ended = self.station.wait();
-        say(&format!(
+        print_line(&format!(
             "the station ended with {:?}: {}",
             ended.code,
             ended.output.lines().last().unwrap_or("")
@@ -141,7 +141,7 @@ impl Pad {
         Ok(wrong)
     }
 
-    /// The vehicle is heard and hears.
+    /// Both directions of the link work.
     fn expect_both_ways(&self) -> Result<(), Failure> {
         let heard = |window: &e2e::Window| window.rows()[0].contains(" down 0s up 0s").then_some(());
         if self.screen.wait_within(e2e::PATIENCE, heard).is_none() {
@@ -170,7 +170,7 @@ fn stepping_clock(command: &mut Command, folder: &Path) -> Result<Option<PathBuf
     let file = folder.join("clock");
     std::fs::write(&file, "+0h\n")?;
     command.env("LD_PRELOAD", library).env("FAKETIME_TIMESTAMP_FILE", &file);
-    // Only the time of day steps. It is read anew every second.
+    // Only the time of day steps. It is read again every second.
     command.env("FAKETIME_DONT_FAKE_MONOTONIC", "1").env("FAKETIME_CACHE_DURATION", "1");
     Ok(Some(file))
 }

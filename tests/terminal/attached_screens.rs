@@ -41,7 +41,7 @@ fn an_abort_without_a_station_is_reported_on_every_screen_and_sent_by_the_next_s
 }
 
 #[test]
-fn an_abort_asked_of_a_station_that_hangs_is_said_at_once_and_sent_when_it_goes_on() {
+fn an_abort_requested_from_a_hung_station_is_reported_at_once_and_sent_when_it_resumes() {
     let pad = Pad::new();
     let daemon = pad.daemon("flight.mcap");
     let mut screen = pad.attach(&[], &[]);
@@ -50,9 +50,9 @@ fn an_abort_asked_of_a_station_that_hangs_is_said_at_once_and_sent_when_it_goes_
     screen.type_bytes(b"\x18\r");
     screen.wait_for(" ABORT NOT SENT: the station hangs; it sends it when it goes on");
     assert_eq!(aborts_sent(&pad), 0);
-    // A new screen shows nothing of it, and says why, and what was asked.
+    // A new screen shows no state, but the reason, and the requested abort.
     let mut late = pad.attach(&[], &[]);
-    late.wait_for("the station does not answer: it hangs or is stopped; ABORT asked at ");
+    late.wait_for("the station does not answer: it hangs or is stopped; ABORT requested at ");
     late.wait_for_end();
     daemon.signal(Signal::SIGCONT);
     screen.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
@@ -61,7 +61,7 @@ fn an_abort_asked_of_a_station_that_hangs_is_said_at_once_and_sent_when_it_goes_
 }
 
 #[test]
-fn the_station_after_one_that_hung_says_which_abort_was_asked_and_not_confirmed() {
+fn the_station_after_one_that_hung_reports_the_unconfirmed_abort() {
     let pad = Pad::new();
     let first = pad.daemon("first.mcap");
     let mut screen = pad.attach(&[], &[]);
@@ -75,11 +75,11 @@ fn the_station_after_one_that_hung_says_which_abort_was_asked_and_not_confirmed(
     first.wait();
     let second = pad.daemon("second.mcap");
     let mut shown = pad.attach(&[], &[]);
-    shown.wait_for("ALARM ABORT asked at ");
+    shown.wait_for("ALARM ABORT requested at ");
     assert_eq!(aborts_sent(&pad), 0, "nothing is sent by itself");
     shown.type_bytes(b"\x18\r");
     shown.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
-    shown.wait_until("no open abort", |window| (!window.shows("ABORT asked at ")).then_some(()));
+    shown.wait_until("no open abort", |window| (!window.shows("ABORT requested at ")).then_some(()));
     second.signal(Signal::SIGTERM);
     assert_eq!(second.wait().code, Some(4), "the exit code of an aborted flight");
 }

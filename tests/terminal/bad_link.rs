@@ -31,7 +31,7 @@ fn with_heavy_loss_arming_works_and_the_abort_arrives() {
     let attempts = rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     assert_eq!(attempts, rig.sent(ABORT, 1.0), "the screen shows another number of attempts than were sent");
     rig.terminal.wait_for(" disarmed");
-    rig.terminal.wait_until("that nobody may come near", |window| {
+    rig.terminal.wait_until("the warning to stay away", |window| {
         let rows = window.rows().concat();
         rows.contains("do not approach").then_some(())
     });
@@ -68,8 +68,8 @@ fn an_arm_whose_answers_are_lost_is_repeated_for_two_seconds_done_once_and_the_h
     let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("every arming check passes");
     rig.proxy.impair(Impairment { drops_answers: true, ..Impairment::default() });
-    // A hand types again only if nothing was sent: keys may arrive so bunched that they are asked
-    // again.
+    // A hand types again only if nothing was sent: keys may arrive so bunched that they are
+    // confirmed again.
     rig.type_until(b"AARM\r", "ARM    commanded");
     rig.wait_for_fact("ARM", "acknowledged NEVER  observed yes");
     rig.terminal.wait_for(" ARMED ");
@@ -87,7 +87,7 @@ fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_re
     rig.terminal.wait_for("~ARMED");
     rig.terminal.wait_for("LINK LOST");
     rig.terminal.wait_for(" PREDICTED ");
-    rig.terminal.wait_for("last heard ");
+    rig.terminal.wait_for("last data ");
     rig.terminal.wait_for("MAY NOT ARRIVE");
     rig.abort();
     rig.wait_for_attempts("ABORT", 5);

@@ -15,7 +15,7 @@ use protocol::log::writer::LogHeader;
 use super::rig::{Rig, SIZE, ground};
 
 /// Reads a log to its end and returns the messages on this topic.
-fn whole_log(path: &Path, topic: &str) -> Vec<String> {
+fn complete_log(path: &Path, topic: &str) -> Vec<String> {
     let mut reader = LogReader::new(std::fs::File::open(path).unwrap());
     let mut found = Vec::new();
     while let Some(item) = reader.next_item().unwrap() {
@@ -44,8 +44,8 @@ fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
         (|terminal| terminal.signal(Signal::SIGUSR2), false),
         (|terminal| terminal.signal(Signal::SIGABRT), false),
     ];
-    for (end, tells_repeats) in endings {
-        let mut rig = Rig::on_terminal("mk2", tells_repeats, "xterm-256color");
+    for (end, reports_repeats) in endings {
+        let mut rig = Rig::on_terminal("mk2", reports_repeats, "xterm-256color");
         rig.terminal.wait_for("every arming check passes");
         assert!(!rig.terminal.is_restored(), "the screen is not open");
         rig.terminal.type_bytes(b"5");
@@ -55,7 +55,7 @@ fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
         assert!(rig.terminal.is_restored(), "{:?}", rig.terminal.window().rows());
         // Its last line is written to the restored terminal.
         rig.terminal.wait_for("log: ground.mcap");
-        let keys = whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
+        let keys = complete_log(&rig.folder.path().join("ground.mcap"), "/operator");
         assert!(keys.iter().any(|key| key.contains("key") && key.contains('5')), "{keys:?}");
     }
 }
@@ -79,7 +79,7 @@ fn while_armed_the_screen_quits_only_by_a_typed_word_and_the_station_continues()
     second.wait_for_fact("ABORT", "acknowledged accepted  observed yes");
     rig.terminal.signal(Signal::SIGTERM);
     assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
-    whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
+    complete_log(&rig.folder.path().join("ground.mcap"), "/operator");
 }
 
 #[test]
@@ -109,11 +109,11 @@ fn after_a_hangup_the_station_continues_and_another_screen_shows_everything() {
     }
     rig.terminal.signal(Signal::SIGTERM);
     assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
-    let said = whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
+    let said = complete_log(&rig.folder.path().join("ground.mcap"), "/operator");
     assert!(said.iter().any(|said| said.contains("ABORT observed")), "{said:?}");
 }
 
-/// After Ctrl-S or in a hanging session nobody reads the program's output.
+/// After Ctrl-S or in a hanging session the program's output has no reader.
 #[test]
 fn a_terminal_that_reads_nothing_blocks_neither_link_nor_abort_nor_log() {
     let mut rig = Rig::new("mk2");
@@ -140,7 +140,7 @@ fn a_terminal_that_reads_nothing_blocks_neither_link_nor_abort_nor_log() {
     rig.terminal.signal(Signal::SIGTERM);
     assert_eq!(rig.terminal.wait_for_end(), Some(4), "the exit code of an aborted flight");
     assert!(rig.terminal.is_restored());
-    whole_log(&rig.folder.path().join("ground.mcap"), "/operator");
+    complete_log(&rig.folder.path().join("ground.mcap"), "/operator");
 }
 
 /// This variable is set for the child process of the test below, which runs the same test program.
@@ -167,9 +167,9 @@ fn a_panic_restores_the_terminal_is_reported_and_completes_the_log() {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--exact", name, "--nocapture"]).env(PANICS_HERE, &log);
     command.env("RUST_BACKTRACE", "0");
-    for tells_repeats in [false, true] {
+    for reports_repeats in [false, true] {
         let _ = std::fs::remove_file(&log);
-        let mut terminal = Terminal::start(&command, SIZE, tells_repeats);
+        let mut terminal = Terminal::start(&command, SIZE, reports_repeats);
         assert_eq!(terminal.wait_for_end(), Some(101), "the exit code of a failed test");
         assert!(terminal.is_restored());
         terminal.wait_for("the screen has failed on purpose");
@@ -177,7 +177,7 @@ fn a_panic_restores_the_terminal_is_reported_and_completes_the_log() {
             terminal.window().bytes().windows(8).any(|bytes| bytes == b"\x1b[?1049h"),
             "the screen was not open"
         );
-        let said = whole_log(&log, "/events");
+        let said = complete_log(&log, "/events");
         assert!(said.iter().any(|said| said.contains("before the panic")), "{said:?}");
     }
 }

@@ -11,7 +11,7 @@ const HELD: &str = "no commanding screen in the countdown: HOLD";
 fn start(screen: &mut Terminal) {
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.wait_for("✓ armed, says HEARTBEAT");
+    screen.wait_for("✓ armed (HEARTBEAT)");
     screen.type_until(b"SSTART\r", "START  commanded");
     screen.wait_for_fact("START", "observed yes");
 }
@@ -29,8 +29,8 @@ fn a_screen_whose_process_is_stopped_holds_the_countdown() {
     screen.signal(Signal::SIGSTOP);
     daemon.wait_for_line(HELD);
     daemon.wait_for_line("HOLD: no countdown");
-    let told = status(&pad);
-    assert!(told.contains("PAD_ARMED") && told.contains("anna (does not answer)"), "{told}");
+    let report = status(&pad);
+    assert!(report.contains("PAD_ARMED") && report.contains("anna (does not answer)"), "{report}");
     screen.signal(Signal::SIGCONT);
     daemon.wait_for_line("at the controls: screen 1, anna");
 }
@@ -51,7 +51,7 @@ fn a_screen_whose_connection_died_holds_the_countdown() {
 }
 
 #[test]
-fn a_station_whose_own_terminal_hangs_holds_the_countdown() {
+fn a_station_whose_local_terminal_hangs_holds_the_countdown() {
     let mut rig = Rig::new("mk2");
     start(&mut rig.terminal);
     let Rig { terminal, vehicle, .. } = &mut rig;
@@ -62,7 +62,7 @@ fn a_station_whose_own_terminal_hangs_holds_the_countdown() {
 }
 
 #[test]
-fn a_terminal_without_a_screen_says_what_it_cannot_do_and_does_not_count() {
+fn a_terminal_without_a_screen_reports_its_limits_and_does_not_count() {
     let pad = Pad::new();
     let _daemon = pad.daemon("flight.mcap");
     let lines = pad.attach(&[], &[("TERM", "dumb")]);
@@ -80,7 +80,7 @@ fn a_screen_that_ends_leaves_no_answer_behind() {
     screen.wait_for("every arming check passes");
     screen.type_bytes(b"q");
     assert_eq!(screen.wait_for_end(), Some(0));
-    let asked = screen.window().bytes().windows(4).any(|bytes| bytes == b"\x1b[5n");
-    assert!(asked && screen.is_restored());
-    daemon.wait_for_line("nobody commands");
+    let queried = screen.window().bytes().windows(4).any(|bytes| bytes == b"\x1b[5n");
+    assert!(queried && screen.is_restored());
+    daemon.wait_for_line("no commanding screen");
 }

@@ -39,13 +39,13 @@ fn keys_that_arrive_in_bunches_arm_and_start_after_the_question() {
     let mut rig = Rig::new("mk2");
     rig.terminal.wait_for("every arming check passes");
     rig.terminal.type_in_bunches(b"AARM\r", &[2, 3]);
-    assert!(rig.terminal.confirm_if_asked(" ARMED "), "keys that came together were taken for typed ones");
-    rig.terminal.wait_for("✓ armed, says HEARTBEAT");
+    assert!(rig.terminal.confirm_if_prompted(" ARMED "), "keys that came together were taken for typed ones");
+    rig.terminal.wait_for("✓ armed (HEARTBEAT)");
     rig.terminal.type_in_bunches(b"SSTART\r", &[1, 4, 2]);
-    assert!(rig.terminal.confirm_if_asked("START  commanded"));
+    assert!(rig.terminal.confirm_if_prompted("START  commanded"));
     rig.wait_for_fact("START", "observed yes");
     assert_eq!(rig.sent(ARM, 1.0), 1);
-    // What holds or disarms is not asked again.
+    // A hold and a disarm need no second confirmation.
     rig.terminal.type_in_bunches(b"D\r", &[2]);
     rig.terminal.wait_for(" disarmed");
 }

@@ -52,7 +52,7 @@ fn a_power_cycle_in_the_countdown_is_an_alarm_and_start_is_no_longer_observed() 
     rig.terminal.wait_for_end();
 }
 
-/// The vehicle stays switched on: neither its boot nor its clock tells it.
+/// The vehicle stays switched on: neither its boot nor its clock shows it.
 #[test]
 fn a_reset_in_the_countdown_is_an_alarm_and_hides_go_until_somebody_has_seen_it() {
     let mut rig = Rig::with_fault("mk2", "reboot:0.1@pad-armed+7");
@@ -135,7 +135,7 @@ fn a_vehicle_killed_in_its_descent_and_restarted_waits_disarmed_for_new_commands
         station.wait_for("every arming check passes");
         station.type_until(b"AARM\r", " ARMED ");
         flying.wait_for_line("PAD_ARMED");
-        station.wait_for("✓ armed, says HEARTBEAT");
+        station.wait_for("✓ armed (HEARTBEAT)");
         station.type_until(b"SSTART\r", "START  commanded");
         flying.wait_for_line("AERO_DESCENT");
         station.wait_for("AERO_DESCENT");

@@ -11,7 +11,7 @@ fn logs_that_are_removed_in_the_countdown_are_an_alarm_and_lose_nothing() {
     let mut screen = pad.attach(&[], &[]);
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.wait_for("✓ armed, says HEARTBEAT");
+    screen.wait_for("✓ armed (HEARTBEAT)");
     screen.type_until(b"SSTART\r", "START  commanded");
     for file in ["flight.mcap", "flight.tlog"] {
         std::fs::remove_file(pad.folder.path().join(file)).unwrap();
@@ -24,8 +24,8 @@ fn logs_that_are_removed_in_the_countdown_are_an_alarm_and_lose_nothing() {
     assert!(!output.contains("HOLD") && output.contains("flight-2.mcap"), "{output}");
     let logs = ["flight.mcap", "flight-2.mcap"].map(|name| pad.folder.path().join(name));
     for log in &logs {
-        let told = Running::to_end(program(Program::Replay).arg("info").arg(log));
-        assert_eq!(told.code, Some(0), "{}", told.output);
+        let info = Running::to_end(program(Program::Replay).arg("info").arg(log));
+        assert_eq!(info.code, Some(0), "{}", info.output);
         assert!(log.with_extension("tlog").metadata().unwrap().len() > 1_000);
     }
     assert!(!pad.folder.path().join("flight-3.mcap").exists(), "{output}");

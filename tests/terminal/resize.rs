@@ -22,7 +22,7 @@ const CLEAR: &[u8] = b"\x1b[2J";
 
 /// Changes the size and checks that nothing of the previous size is left: when the screen is drawn
 /// again from scratch, it looks the same.
-fn assert_whole(rig: &mut Rig, size: (u16, u16)) {
+fn assert_complete(rig: &mut Rig, size: (u16, u16)) {
     rig.terminal.resize(size);
     // A frame that shows the effect of a key was drawn after the key, so at the new size. These
     // keys change nothing else.
@@ -58,9 +58,9 @@ fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
         rig.terminal.resize((u16::try_from(columns).unwrap(), u16::try_from(rows).unwrap()));
     }
     for size in SIZES {
-        assert_whole(&mut rig, size);
+        assert_complete(&mut rig, size);
     }
-    assert_whole(&mut rig, SIZE);
+    assert_complete(&mut rig, SIZE);
     // Keys still work, also in the smallest window.
     rig.terminal.resize((20, 5));
     rig.type_until(b"AARM\r", " ARMED");

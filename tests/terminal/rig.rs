@@ -38,14 +38,14 @@ impl Rig {
         rig
     }
 
-    /// The same on a terminal of this kind; `tells_repeats` says whether it distinguishes key
+    /// The same on a terminal of this kind; `reports_repeats` is whether it distinguishes key
     /// repeats from presses.
-    pub(crate) fn on_terminal(profile: &'static str, tells_repeats: bool, kind: &str) -> Self {
+    pub(crate) fn on_terminal(profile: &'static str, reports_repeats: bool, kind: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let proxy = UdpProxy::new();
         let link = proxy.ground_link();
         let mut command = ground(folder.path(), &["--connect", &link, "--log", "ground.mcap"]);
-        let terminal = Terminal::start(command.env("TERM", kind), SIZE, tells_repeats);
+        let terminal = Terminal::start(command.env("TERM", kind), SIZE, reports_repeats);
         let vehicle = Running::start(&mut vehicle(profile, &proxy, folder.path()));
         Self { terminal, proxy, vehicle, profile, folder }
     }
@@ -80,7 +80,7 @@ impl Rig {
     pub(crate) fn arm(&mut self) -> usize {
         self.terminal.wait_for("every arming check passes");
         let climbed = self.type_until(b"AARM\r", " ARMED ");
-        self.terminal.wait_for("✓ armed, says HEARTBEAT");
+        self.terminal.wait_for("✓ armed (HEARTBEAT)");
         climbed
     }
 

@@ -12,7 +12,7 @@ fn what_waited_while_the_station_stood_still_is_in_the_log_and_not_on_the_screen
     let mut screen = pad.attach(&[], &[]);
     screen.wait_for("every arming check passes");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.wait_for("✓ armed, says HEARTBEAT");
+    screen.wait_for("✓ armed (HEARTBEAT)");
     screen.type_until(b"SSTART\r", "START  commanded");
     daemon.wait_for_line("-> BOOST");
     daemon.signal(Signal::SIGSTOP);

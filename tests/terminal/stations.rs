@@ -65,10 +65,10 @@ fn stations_are_listed_and_stopped_and_an_armed_one_only_by_force() {
     ] {
         assert!(listed.output.contains(words), "no {words} in:\n{}", listed.output);
     }
-    let told: serde_json::Value = serde_json::from_str(&station.run(&["status", "--json"]).output).unwrap();
-    assert_eq!((&told[0]["phase"], &told[0]["armed"]), (&"PAD_IDLE".into(), &false.into()), "{told}");
-    assert_eq!(told[0]["screens"].as_array().map(Vec::len), Some(1), "{told}");
-    assert!(Path::new(told[0]["log"].as_str().unwrap()).is_absolute(), "{told}");
+    let report: serde_json::Value = serde_json::from_str(&station.run(&["status", "--json"]).output).unwrap();
+    assert_eq!((&report[0]["phase"], &report[0]["armed"]), (&"PAD_IDLE".into(), &false.into()), "{report}");
+    assert_eq!(report[0]["screens"].as_array().map(Vec::len), Some(1), "{report}");
+    assert!(Path::new(report[0]["log"].as_str().unwrap()).is_absolute(), "{report}");
     screen.type_until(b"AARM\r", " ARMED ");
     assert!(station.run(&["status"]).output.contains("PAD_ARMED ARMED"));
     let refused = station.run(&["stop"]);
@@ -115,7 +115,7 @@ fn two_operators_who_arm_at_once_arm_once() {
     }
     for screen in [&mut first, &mut second] {
         // On a busy machine keys arrive together.
-        screen.confirm_if_asked(" ARMED ");
+        screen.confirm_if_prompted(" ARMED ");
         screen.wait_for(" ARMED ");
     }
     assert_eq!(station.arms(), 1);

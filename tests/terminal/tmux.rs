@@ -62,7 +62,7 @@ fn a_screen_that_tmux_does_not_show_holds_the_countdown() {
         let screen = &mut tmux.client;
         screen.wait_for("every arming check passes");
         screen.type_until(b"AARM\r", " ARMED ");
-        screen.wait_for("✓ armed, says HEARTBEAT");
+        screen.wait_for("✓ armed (HEARTBEAT)");
         screen.type_until(b"SSTART\r", "START  commanded");
         daemon.wait_for_line("countdown runs");
         tmux.run(hide);

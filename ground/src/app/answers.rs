@@ -1,11 +1,8 @@
-//! Asks the terminal whether it still shows what is written to it, and takes its answers out of
-//! what is typed.
-//!
-//! Bytes that a program has written may wait for ever: in a terminal that hangs, or for a
-//! connection that is dead. Only an answer to a question that went the same way shows that somebody
-//! may be reading. crossterm drops such an answer without a word. So this stands between the
-//! terminal and crossterm: a thread reads the terminal, and passes on everything else over a
-//! pseudo-terminal, which crossterm takes for standard input.
+//! Queries whether the terminal still shows what is written to it, and removes its answers from the
+//! typed input. Written bytes may wait for ever: in a terminal that hangs, or for a dead
+//! connection. Only an answer to a query over the same line shows that a person may be reading.
+//! crossterm silently drops such an answer. So this module reads the terminal in a thread, and
+//! passes everything else to crossterm over a pseudo-terminal in place of standard input.
 //!
 //! tmux answers by itself, also while it shows the past of the pane (copy mode), which takes the
 //! keys, or another window. So a second thread queries tmux whether it shows this pane.
@@ -44,17 +41,17 @@ const QUERY_TMUX_EVERY: Duration = Duration::from_millis(100);
 const TMUX_FORMAT: &str =
     "#{pane_in_mode} #{session_attached} #{window_active} #{&&:#{window_zoomed_flag},#{!=:#{pane_active},1}}";
 
-/// When the last answer arrived that no one has taken note of, and questions without an answer.
-/// There is only one terminal.
+/// When the last answer arrived that was not taken yet, and the number of open queries. There is
+/// only one terminal.
 static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 /// tmux reports that it does not show the screen.
 static HIDDEN: AtomicBool = AtomicBool::new(false);
 
-/// What standard input was, and our end of the pseudo-terminal that replaces it.
+/// The original standard input, and our end of the pseudo-terminal that replaces it.
 static REPLACED: Mutex<Option<(OwnedFd, File)>> = Mutex::new(None);
 
-/// Notes that the terminal is asked.
+/// Counts a query to the terminal.
 pub(super) fn note_question() {
     OPEN_QUESTIONS.fetch_add(1, Ordering::Relaxed);
 }
@@ -112,7 +109,7 @@ pub(super) fn end() {
     // The pseudo-terminal's other end is closed by this: crossterm sees no end of it, at which it
     // would loop.
     if let Some((stdin, _ours)) = replaced().take() {
-        // Fails only if there is no standard input, and then nobody reads it.
+        // Fails only if there is no standard input, and then it has no reader.
         let _ = rustix::stdio::dup2_stdin(&stdin);
     }
 }

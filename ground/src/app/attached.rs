@@ -22,19 +22,19 @@ use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::model::{
-    Action, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished, asked_words,
+    Action, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished, abort_request_words,
 };
 use crate::update::{Msg, update};
 
 /// The period of the screen's own ticks: dialogs and chords expire even while the station sends
 /// nothing.
 const TICK: Duration = Duration::from_millis(100);
-/// A station that says nothing for so long hangs: its next message of its past takes a moment.
+/// Silence after which a station hangs: the next message of its history takes a moment.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(5);
 /// How often a lost station is looked for again.
 const AGAIN_AFTER: Duration = Duration::from_secs(1);
 
-/// What a person reads whose terminal shows no screen.
+/// The text for a person whose terminal shows no screen.
 const LINES_ONLY: &[u8] =
     b"this terminal shows lines only and takes no keys: it can neither hold nor abort, and does not count as a screen\n";
 
@@ -73,7 +73,7 @@ pub async fn session(
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
-    let mut unsent_is_kept = false;
+    let mut is_unsent_stored = false;
     loop {
         let (redraw_at, chord_at) = (output.redraw_at(), model.abort_chord.acts_at());
         let chord_at = chord_at.map(|at| times.ours(at));
@@ -91,22 +91,22 @@ pub async fn session(
                 update(&mut model, msg, times.theirs(clock.now()))
             }
             () = clock.sleep_until(chord_at) => update(&mut model, Msg::ScreenTick, times.theirs(clock.now())),
-            told = link.hear(), if look_again_at.is_none() => {
-                match &told {
+            message = link.receive(), if look_again_at.is_none() => {
+                match &message {
                     Some(Ok((ToScreen::Msg(msg), _))) => output.mark_message(msg, &model),
                     _ => output.mark_changed(),
                 }
-                if let Some(Ok((told, at))) = told {
-                    times.heard(at, clock.now());
-                    take(&mut model, told, at, viewer)
+                if let Some(Ok((message, at))) = message {
+                    times.note_message(at, clock.now());
+                    take(&mut model, message, at, viewer)
                 } else {
                     look_again_at = Some(clock.now() + AGAIN_AFTER);
                     // If the lost station was repeating an abort, the next station must send it.
-                    let asked = model.link.abort_asked_at.take().is_some() || model.commands.is_aborting();
-                    model.link.abort_unsent |= !viewer.watch && asked;
+                    let is_pending = model.link.abort_requested_at.take().is_some() || model.commands.is_aborting();
+                    model.link.abort_unsent |= !viewer.watch && is_pending;
                     // If the station went away while sending the history, the history ends here.
                     model.alarms.history_ends();
-                    model.link.station_gone = true;
+                    model.link.station_lost = true;
                     update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
                 }
             },
@@ -114,7 +114,7 @@ pub async fn session(
                 look_again_at = Some(clock.now() + AGAIN_AFTER);
                 if let Some(mut found) = find_again(named, &model.settings.link_name, viewer).await {
                     let abort_unsent = model.link.abort_unsent
-                        && !found.ask(&ToStation::Request(Request::Command(CommandKind::Abort))).await;
+                        && !found.send(&ToStation::Request(Request::Command(CommandKind::Abort))).await;
                     link = found;
                     // Another station has another clock and another history.
                     times = Times::default();
@@ -131,7 +131,7 @@ pub async fn session(
             }
             _ = ticks.tick() => {
                 if output.answers(clock.now()) {
-                    link.ask(&ToStation::Here).await;
+                    link.send(&ToStation::Here).await;
                 }
                 output.pass(&mut model, clock.now());
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))
@@ -140,7 +140,7 @@ pub async fn session(
         };
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let unix_s = clock.unix_ns() / 1_000_000_000;
-        keep_unsent(&mut unsent_is_kept, &mut model, unix_s, times.theirs(clock.now()));
+        store_unsent_abort(&mut is_unsent_stored, &mut model, unix_s, times.theirs(clock.now()));
         let now = clock.now();
         output.show(&model, now, times.theirs(now))?;
         if quit {
@@ -158,24 +158,27 @@ async fn take_history(
     (times, clock): (&mut Times, &Clock),
     viewer: &Viewer,
 ) -> anyhow::Result<()> {
-    // What another screen of this folder has kept for it.
-    let kept = read_unfinished(Some(Path::new(""))).ok().flatten();
-    let asked = kept.and_then(|kept| kept.abort).map(|at| format!("; ABORT asked at {at} NOT CONFIRMED"));
-    let silent = format!("the station does not answer: it hangs or is stopped{}", asked.unwrap_or_default());
+    // Stored for the station by another screen of this folder.
+    let unfinished = read_unfinished(Some(Path::new(""))).ok().flatten();
+    let pending = unfinished
+        .and_then(|unfinished| unfinished.abort)
+        .map(|at| format!("; ABORT requested at {at} NOT CONFIRMED"));
+    let silent =
+        format!("the station does not answer: it hangs or is stopped{}", pending.unwrap_or_default());
     loop {
-        let told = timeout(ANSWERS_WITHIN, link.hear()).await.with_context(|| silent.clone())?;
-        let Some(told) = told else { return Ok(()) };
-        let (told, at) = told.context("the station")?;
-        times.heard(at, clock.now());
-        let live = told == ToScreen::Live;
-        take(model, told, at, viewer);
+        let message = timeout(ANSWERS_WITHIN, link.receive()).await.with_context(|| silent.clone())?;
+        let Some(message) = message else { return Ok(()) };
+        let (message, at) = message.context("the station")?;
+        times.note_message(at, clock.now());
+        let live = message == ToScreen::Live;
+        take(model, message, at, viewer);
         if live {
             return Ok(());
         }
     }
 }
 
-/// Does the actions that are a screen's own. Returns whether to quit.
+/// Executes the actions of a screen. Returns whether to quit.
 async fn act(
     actions: Vec<Action>,
     model: &mut Model,
@@ -187,17 +190,17 @@ async fn act(
     for action in actions {
         match action {
             Action::Request(request) => {
-                let is_sent = link.ask(&ToStation::Request(request.clone())).await;
+                let is_sent = link.send(&ToStation::Request(request.clone())).await;
                 if !is_sent {
                     report_unsent(model, &request, now);
                 } else if request == Request::Command(CommandKind::Abort) {
-                    model.link.abort_asked_at.get_or_insert(now);
+                    model.link.abort_requested_at.get_or_insert(now);
                 }
             }
             Action::Record(Record::OperatorAction(action)) if action.kind == "key" => {
-                link.ask(&ToStation::Key(action.detail)).await;
+                link.send(&ToStation::Key(action.detail)).await;
             }
-            Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
+            Action::Redraw | Action::NextTheme | Action::Bell | Action::CallOut(_) => {
                 output.act(&action, model, now);
             }
             Action::Quit => quit = true,
@@ -218,25 +221,25 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
     StationConnection::open(&place, viewer).await.ok()
 }
 
-/// Keeps an abort beside the station's log while its station has not sent it, for the next station
-/// and its screens. A station that goes on keeps it by itself.
-fn keep_unsent(is_kept: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
-    let abort = model.link.why_abort_not_sent(now).map(|_| asked_words(unix_s, &model.settings.seat));
-    let changes = abort.is_some() != std::mem::replace(is_kept, abort.is_some());
-    if !changes || (abort.is_none() && !model.link.station_gone) {
+/// Stores an abort beside the station's log while its station has not sent it, for the next station
+/// and its screens. A station that resumes stores it itself.
+fn store_unsent_abort(is_stored: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
+    let abort = model.link.why_abort_not_sent(now).map(|_| abort_request_words(unix_s, &model.settings.seat));
+    let changes = abort.is_some() != std::mem::replace(is_stored, abort.is_some());
+    if !changes || (abort.is_none() && !model.link.station_lost) {
         return;
     }
     let folder = model.settings.log_path.as_deref().and_then(|log| Path::new(log).parent());
-    let kept = Unfinished { abort, ..model.unfinished(now) };
+    let unfinished = Unfinished { abort, ..model.unfinished(now) };
     let Some(folder) = folder.map(Path::to_owned) else { return };
     // In a thread: an abort that waits for a station must not wait for the disk.
-    let written = in_a_thread("unsent abort", move || write_unfinished(&folder, &kept));
+    let written = in_a_thread("unsent abort", move || write_unfinished(&folder, &unfinished));
     if let Err(error) = written {
-        model.warn(now, format!("the next station will not know of this abort: {error}"));
+        model.warn(now, format!("this abort is not stored for the next station: {error}"));
     }
 }
 
-/// Tells the crew that a request has not reached any station.
+/// Reports to the crew that a request has not reached any station.
 fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
     let what = match *request {
         Request::Command(kind) => &format!("{} NOT SENT", kind.row().name),
@@ -245,35 +248,35 @@ fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
             return;
         }
         Request::Sign { step, .. } => &format!("step {} NOT SIGNED", u32::from(step) + 1),
-        Request::Note(_) => "the note is NOT KEPT",
+        Request::Note(_) => "the note is NOT RECORDED",
         _ => "nothing is done",
     };
     let is_abort = *request == Request::Command(CommandKind::Abort);
     // Stays in the alarm line of every page until there is a station again.
     model.link.abort_unsent |= is_abort;
-    let later = if is_abort { "; asked again as soon as there is one" } else { "" };
+    let later = if is_abort { "; it is sent as soon as there is one" } else { "" };
     let text = format!("{what}: this screen has no station{later}");
-    model.say(now, Speaker::Ground, EventLevel::Error, text);
+    model.add_event(now, Speaker::Ground, EventLevel::Error, text);
 }
 
-/// Takes what the station tells. Returns what this screen does about it: the station does the other
-/// actions.
-fn take(model: &mut Model, told: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
-    match told {
+/// Applies a message of the station. Returns this screen's actions: the station executes the
+/// others.
+fn take(model: &mut Model, message: ToScreen, at: Duration, viewer: &Viewer) -> Vec<Action> {
+    match message {
         ToScreen::Hello(hello) => model.settings = settings(&hello, viewer),
         ToScreen::Live => model.alarms.history_ends(),
         ToScreen::Msg(msg) => {
             let mut actions = update(model, msg, at);
-            actions.retain(|action| matches!(action, Action::Bell | Action::Say(_) | Action::Alarm(_)));
+            actions.retain(|action| matches!(action, Action::Bell | Action::CallOut(_) | Action::Alarm(_)));
             return actions;
         }
-        // A screen does not ask for these.
+        // A screen does not request these.
         ToScreen::Status(_) | ToScreen::Stopping { .. } => {}
     }
     Vec::new()
 }
 
-/// The station's settings with the screen's own.
+/// The station's settings with those of this screen.
 fn settings(hello: &Hello, viewer: &Viewer) -> Settings {
     Settings {
         role: if viewer.watch { Role::Watching } else { Role::Attached },
@@ -292,7 +295,7 @@ struct Times {
 }
 
 impl Times {
-    fn heard(&mut self, theirs: Duration, ours: Duration) {
+    fn note_message(&mut self, theirs: Duration, ours: Duration) {
         if theirs >= self.theirs_at {
             (self.theirs_at, self.ours_at) = (theirs, ours);
         }
@@ -308,26 +311,26 @@ impl Times {
 }
 
 struct StationConnection {
-    told: FramedRead<OwnedReadHalf, LengthDelimitedCodec>,
+    messages: FramedRead<OwnedReadHalf, LengthDelimitedCodec>,
     write: OwnedWriteHalf,
 }
 
 impl StationConnection {
     async fn open(path: &Path, viewer: &Viewer) -> std::io::Result<Self> {
         let (read, write) = socket::connect(path).await?.into_split();
-        let mut link = Self { told: messages(read), write };
-        link.ask(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
+        let mut link = Self { messages: messages(read), write };
+        link.send(&ToStation::Hello { watch: viewer.watch, operator: viewer.operator.clone() }).await;
         Ok(link)
     }
 
-    /// What the station tells next, and when it told it; `None` at its end.
-    async fn hear(&mut self) -> Option<Result<(ToScreen, Duration), CodecError>> {
-        let bytes = self.told.next().await?.ok()?;
+    /// The next message of the station with its time; `None` at its end.
+    async fn receive(&mut self) -> Option<Result<(ToScreen, Duration), CodecError>> {
+        let bytes = self.messages.next().await?.ok()?;
         Some(decode_to_screen(&bytes))
     }
 
-    /// Sends a message. Returns whether the station still takes it.
-    async fn ask(&mut self, asked: &ToStation) -> bool {
-        self.write.write_all(&encode_to_station(asked)).await.is_ok()
+    /// Sends a message. Returns whether the station still accepts it.
+    async fn send(&mut self, request: &ToStation) -> bool {
+        self.write.write_all(&encode_to_station(request)).await.is_ok()
     }
 }

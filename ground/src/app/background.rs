@@ -1,4 +1,4 @@
-//! What the station has written outside its run loop.
+//! Files that the station writes outside its run loop.
 
 use protocol::log::recorder::Recorder;
 
@@ -7,7 +7,7 @@ use super::files::LogFiles;
 /// A file that a job writes, in order of urgency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Target {
-    /// The unconfirmed abort and the reason to keep away, for the next run.
+    /// The unconfirmed abort and the reason to stay away, for the next run.
     Unfinished,
     /// A numbered entry of the checklist's signatures.
     Signature(u64),

@@ -1,5 +1,5 @@
-//! What a screen receives when it attaches: the newest messages of the station, and of older ones
-//! everything that its state follows from.
+//! The history for a screen that attaches: the newest messages of the station, and every older one
+//! that its state follows from.
 //!
 //! An hour on the pad is 700,000 messages, and nearly all of them repeat a state. An abort, its
 //! answers and every change of the vehicle's state are retained however old they are, so a screen
@@ -47,7 +47,7 @@ pub(super) struct Backlog {
     older: Older,
 }
 
-/// What is retained of messages that no longer fit.
+/// The retained part of messages that no longer fit.
 #[derive(Default)]
 struct Older {
     /// Commands, answers, texts and changes of state, each with its time.
@@ -92,7 +92,11 @@ impl Older {
         // A message that cannot be decoded was of no use to any screen.
         let Ok((ToScreen::Msg(msg), at)) = decode_to_screen(message) else { return };
         match &msg {
-            Msg::Tick | Msg::Received { .. } | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) => {}
+            Msg::Tick
+            | Msg::Received { .. }
+            | Msg::Sent { .. }
+            | Msg::Links { .. }
+            | Msg::ReceivedOver(_) => {}
             Msg::Frame(frame) if !self.is_event(frame) => {
                 let source = frame.source();
                 let key = (source.system_id, source.component_id, frame.message_id());
@@ -224,7 +228,7 @@ mod tests {
     #[test]
     fn the_newest_messages_are_complete_and_the_backlog_is_bounded() {
         let mut backlog = Backlog::default();
-        let words = |number: u64| Msg::LinkSays(format!("{number}{}", "x".repeat(number as usize % 300)));
+        let words = |number: u64| Msg::LinkWarning(format!("{number}{}", "x".repeat(number as usize % 300)));
         for number in 0..200_000 {
             backlog.push(&prefixed(&words(number), Duration::from_nanos(number)));
             assert!(backlog.bytes <= RECENT_BYTES_MAX && backlog.older.bytes <= OLDER_BYTES_MAX);

@@ -20,7 +20,7 @@ pub struct Clock {
 
 impl Clock {
     /// A clock that starts now.
-    #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else is told the time")]
+    #[expect(clippy::disallowed_methods, reason = "the run loop's clock; everything else receives the time")]
     pub fn start() -> Self {
         let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         Self { start: since_boot(), start_unix_ns: nanoseconds(since_epoch) }
@@ -50,7 +50,7 @@ impl Clock {
     }
 }
 
-/// A clock that goes on while the computer sleeps, as the vehicle's does.
+/// A clock that runs on while the computer sleeps, like the vehicle's.
 pub(super) fn since_boot() -> Duration {
     #[cfg(target_os = "linux")]
     const CLOCK: ClockId = ClockId::Boottime;

@@ -1,6 +1,6 @@
 //! `ground download`: fetches the vehicle's own log (MAVLink FTP) over a link of its own. It sends
-//! no heartbeat: nothing that it does may look like a station that watches over the vehicle.
-//! `protocol::ftp::download` decides what to ask for.
+//! no heartbeat, so that the vehicle cannot take it for a station that watches over it.
+//! `protocol::ftp::download` decides what to request.
 
 use std::fs::File;
 use std::io;
@@ -40,7 +40,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let mut wire = explained(opened, &link.connect).await?;
     // Another number every millisecond: its requests differ from those of an earlier download.
     let mut download = Download::new(name.as_deref(), (clock.start_unix_ns() >> 20) as u16);
-    let mut kept: Option<Kept> = None;
+    let mut partial: Option<PartialLog> = None;
     let mut signals = Signals::listen()?;
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -49,7 +49,7 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         let msgs = tokio::select! {
             biased;
             signal = signals.next() => {
-                anyhow::bail!("stopped by {signal}; the same command goes on with what is here");
+                anyhow::bail!("stopped by {signal}; the same command resumes it");
             }
             received = wire.receive() => wire.take(received),
             _ = ticks.tick() => Vec::new(),
@@ -64,13 +64,13 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             match download.take(&packet, now) {
                 Some(DownloadEvent::Opened { crc }) => {
                     let name = download.name().unwrap_or_default();
-                    let (opened, bytes) = Kept::open(out, vehicle.system_id, name, crc)?;
-                    kept = Some(opened);
+                    let (opened, bytes) = PartialLog::open(out, vehicle.system_id, name, crc)?;
+                    partial = Some(opened);
                     download.resume(bytes);
                 }
                 Some(DownloadEvent::Data(data)) => {
-                    if let Some(kept) = &mut kept {
-                        kept.file.write_all(&data)?;
+                    if let Some(partial) = &mut partial {
+                        partial.file.write_all(&data)?;
                     }
                 }
                 None => {}
@@ -82,14 +82,14 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         if let Some(progress) = download.progress() {
             let tenths = 1 + 10 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
             if tenths > std::mem::replace(&mut tenths_shown, tenths) {
-                // If nobody reads it, the download goes on.
+                // The download continues without a reader.
                 let (name, words) = (download.name().unwrap_or_default(), in_words(&progress));
                 let _ = writeln!(io::stderr(), "log {name}: {words}");
             }
         }
         if let Some(ended) = download.ended() {
             ended?;
-            let path = kept.context("the vehicle's log has no content")?.finish()?;
+            let path = partial.context("the vehicle's log has no content")?.finish()?;
             wire.save_timestamps();
             print(format!("log {}\n", path.display()).as_bytes())?;
             return Ok(Exit::Yes);
@@ -105,65 +105,69 @@ fn in_words(progress: &Progress) -> String {
         Some(left_s) if left_s >= 90.0 => format!(", {:.0} min left", left_s / 60.0),
         Some(left_s) => format!(", {left_s:.0} s left"),
     };
-    let (here, whole) = (megabytes(progress.bytes), megabytes(progress.len));
-    format!("{here:.2} of {whole:.2} MB, {:.1} kB/s{left}", progress.bytes_s / 1000.0)
+    let (here, all) = (megabytes(progress.bytes), megabytes(progress.len));
+    format!("{here:.2} of {all:.2} MB, {:.1} kB/s{left}", progress.bytes_s / 1000.0)
 }
 
-// The files of a download: the beginning of the log that has arrived, with the checksum of the
-// whole in its name (`.1A2B3C4D.part`), and the log once it is whole. An existing log is kept.
+// The files of a download: the received beginning of the log, with the checksum of the complete log
+// in its name (`.1A2B3C4D.part`), and the complete log. An existing log is preserved.
 
 /// Bytes read at once for a checksum.
 const READ_AT_ONCE: usize = 256 * 1024;
 
 /// The files of one download.
 #[derive(Debug)]
-struct Kept {
-    whole: PathBuf,
-    beginning: PathBuf,
+struct PartialLog {
+    complete: PathBuf,
+    part: PathBuf,
     file: File,
     crc: u32,
 }
 
-impl Kept {
-    /// Opens the file for the vehicle's log of this name and checksum, and returns how much an
-    /// earlier download has left.
+impl PartialLog {
+    /// Opens the file for the vehicle's log of this name and checksum, and returns the bytes of an
+    /// earlier download.
     ///
     /// # Errors
-    /// This log is here already, or a file cannot be made.
+    /// This log is here already, or a file cannot be created.
     fn open(folder: &Path, vehicle: u8, name: &str, crc: u32) -> anyhow::Result<(Self, u32)> {
         // The name comes over the air: it must not lead out of the folder.
         let is_plain = |letter: &char| letter.is_ascii_alphanumeric() || "._-".contains(*letter);
         let plain: String = name.chars().filter(is_plain).collect();
-        let whole = folder.join(format!("vehicle{vehicle}-{plain}"));
+        let complete = folder.join(format!("vehicle{vehicle}-{plain}"));
         let is_it = |mut file| checksum(&mut file).is_ok_and(|here| here == crc);
-        anyhow::ensure!(!File::open(&whole).is_ok_and(is_it), "{} is this log already", whole.display());
-        let beginning = folder.join(format!("vehicle{vehicle}-{plain}.{crc:08X}.part"));
-        let opened = File::options().create(true).read(true).append(true).open(&beginning);
-        let file = opened.with_context(|| format!("opening {}", beginning.display()))?;
+        anyhow::ensure!(
+            !File::open(&complete).is_ok_and(is_it),
+            "{} is this log already",
+            complete.display()
+        );
+        let part = folder.join(format!("vehicle{vehicle}-{plain}.{crc:08X}.part"));
+        let opened = File::options().create(true).read(true).append(true).open(&part);
+        let file = opened.with_context(|| format!("opening {}", part.display()))?;
         let bytes = u32::try_from(file.metadata()?.len())?;
-        Ok((Self { whole, beginning, file, crc }, bytes))
+        Ok((Self { complete, part, file, crc }, bytes))
     }
 
-    /// The log is whole: gives it its name, or the next free one.
+    /// Gives the complete log its name, or the next free one.
     ///
     /// # Errors
-    /// It is not what the vehicle has, or the disk fails.
+    /// It differs from the vehicle's log, or the disk fails.
     fn finish(self) -> anyhow::Result<PathBuf> {
-        let Self { whole, beginning, mut file, crc } = self;
+        let Self { complete, part, mut file, crc } = self;
         if checksum(&mut file)? != crc {
-            std::fs::remove_file(&beginning)?;
-            anyhow::bail!("what arrived is not what the vehicle has: the checksums differ; fetch it again");
+            std::fs::remove_file(&part)?;
+            anyhow::bail!("the download differs from the vehicle's log (checksum); fetch it again");
         }
         file.sync_all()?;
         // A link fails if the name is taken; a rename would overwrite. Some file systems have no
         // such links.
-        let named = under_free_name(&whole, |name| match std::fs::hard_link(&beginning, name) {
-            Err(_) if name.symlink_metadata().is_err() => std::fs::rename(&beginning, name),
-            linked => linked.and_then(|()| std::fs::remove_file(&beginning)),
+        let named = under_free_name(&complete, |name| match std::fs::hard_link(&part, name) {
+            Err(_) if name.symlink_metadata().is_err() => std::fs::rename(&part, name),
+            linked => linked.and_then(|()| std::fs::remove_file(&part)),
         });
         let (free, ()) = named
-            .with_context(|| format!("{}: the download is in {}", whole.display(), beginning.display()))?;
-        if let Some(words) = other_name(&whole, &free) {
+            .with_context(|| format!("{}: the download is in {}", complete.display(), part.display()))?;
+        if let Some(words) = other_name(&complete, &free) {
             print(format!("{words}\n").as_bytes())?;
         }
         Ok(free)
@@ -183,51 +187,51 @@ fn checksum(file: &mut File) -> io::Result<u32> {
 }
 
 #[cfg(test)]
-mod kept_tests {
+mod partial_log_tests {
     use super::*;
 
     const CRC: u32 = 0x5;
 
-    fn open(folder: &Path, crc: u32) -> anyhow::Result<(Kept, u32)> {
-        Kept::open(folder, 1, "../flight.mcap", crc)
+    fn open(folder: &Path, crc: u32) -> anyhow::Result<(PartialLog, u32)> {
+        PartialLog::open(folder, 1, "../flight.mcap", crc)
     }
 
     #[test]
     fn the_beginning_survives_and_becomes_a_log_that_is_never_overwritten() {
         let folder = tempfile::tempdir().unwrap();
         let crc = crc::continued(0, b"abcdefg");
-        let (mut kept, bytes) = open(folder.path(), crc).unwrap();
+        let (mut partial, bytes) = open(folder.path(), crc).unwrap();
         assert_eq!(bytes, 0);
-        kept.file.write_all(b"abc").unwrap();
-        drop(kept);
+        partial.file.write_all(b"abc").unwrap();
+        drop(partial);
         assert_eq!(open(folder.path(), CRC).unwrap().1, 0, "another log of this name");
-        let (mut kept, bytes) = open(folder.path(), crc).unwrap();
+        let (mut partial, bytes) = open(folder.path(), crc).unwrap();
         assert_eq!(bytes, 3);
-        kept.file.write_all(b"defg").unwrap();
-        let whole = kept.finish().unwrap();
-        assert_eq!(whole, folder.path().join("vehicle1-..flight.mcap"));
-        assert_eq!(std::fs::read(&whole).unwrap(), b"abcdefg");
+        partial.file.write_all(b"defg").unwrap();
+        let complete = partial.finish().unwrap();
+        assert_eq!(complete, folder.path().join("vehicle1-..flight.mcap"));
+        assert_eq!(std::fs::read(&complete).unwrap(), b"abcdefg");
         let refused = open(folder.path(), crc).unwrap_err();
-        assert_eq!(refused.to_string(), format!("{} is this log already", whole.display()));
+        assert_eq!(refused.to_string(), format!("{} is this log already", complete.display()));
     }
 
     #[test]
     fn another_log_of_the_name_stays() {
         let folder = tempfile::tempdir().unwrap();
-        let (mut kept, _) = open(folder.path(), crc::continued(0, b"new")).unwrap();
-        kept.file.write_all(b"new").unwrap();
-        let whole = folder.path().join("vehicle1-..flight.mcap");
-        std::fs::write(&whole, "old").unwrap();
-        assert_eq!(std::fs::read(kept.finish().unwrap()).unwrap(), b"new");
-        assert_eq!(std::fs::read(whole).unwrap(), b"old");
+        let (mut partial, _) = open(folder.path(), crc::continued(0, b"new")).unwrap();
+        partial.file.write_all(b"new").unwrap();
+        let complete = folder.path().join("vehicle1-..flight.mcap");
+        std::fs::write(&complete, "old").unwrap();
+        assert_eq!(std::fs::read(partial.finish().unwrap()).unwrap(), b"new");
+        assert_eq!(std::fs::read(complete).unwrap(), b"old");
     }
 
     #[test]
     fn a_log_that_is_not_the_vehicle_s_gets_no_name_and_is_fetched_anew() {
         let folder = tempfile::tempdir().unwrap();
-        let (mut kept, _) = open(folder.path(), CRC).unwrap();
-        kept.file.write_all(b"damaged").unwrap();
-        assert!(kept.finish().is_err());
+        let (mut partial, _) = open(folder.path(), CRC).unwrap();
+        partial.file.write_all(b"damaged").unwrap();
+        assert!(partial.finish().is_err());
         assert_eq!(open(folder.path(), CRC).unwrap().1, 0);
     }
 }

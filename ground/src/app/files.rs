@@ -1,5 +1,5 @@
 //! The files that a station writes: the log, the book in it, the signatures of a checklist, the
-//! last place.
+//! last position.
 
 use std::fs;
 use std::fs::File;
@@ -23,8 +23,8 @@ use crate::model::{
 };
 
 /// Opens the chosen log, and with a real link a telemetry log beside it (`.tlog`, for other ground
-/// stations); `Ok(None)` if no log is wanted. A log that exists is kept: the new one gets the next
-/// free name.
+/// stations); `Ok(None)` if no log is wanted. An existing log is preserved: the new one gets the
+/// next free name.
 ///
 /// # Errors
 /// A file cannot be created.
@@ -48,16 +48,16 @@ fn named_by_time(header: &LogHeader) -> anyhow::Result<PathBuf> {
     Ok(PathBuf::from(format!("touchdown-{stamp}.mcap")))
 }
 
-/// What to say if the log has another name than it was given.
+/// The notice that the log has another name than the given one.
 pub(super) fn other_name(choice: Option<&LogChoice>, log: Option<&Path>) -> Option<String> {
-    let (Some(LogChoice::File(asked)), Some(log)) = (choice, log) else { return None };
-    recorder::other_name(asked, log)
+    let (Some(LogChoice::File(named)), Some(log)) = (choice, log) else { return None };
+    recorder::other_name(named, log)
 }
 
 /// How often the space is measured; the rate is a mean over this time.
 const MEASURED_EVERY: Duration = Duration::from_secs(5);
 
-/// What the disk reports of the log's files.
+/// State of the log's files on the disk.
 pub(super) struct LogFiles {
     path: PathBuf,
     bytes: u64,
@@ -67,7 +67,7 @@ pub(super) struct LogFiles {
 }
 
 impl LogFiles {
-    /// Asks the disk.
+    /// Queries the disk.
     pub(super) fn of(recorder: &Recorder) -> Self {
         let folder = recorder.path().parent().filter(|folder| !folder.as_os_str().is_empty());
         Self {
@@ -82,7 +82,7 @@ impl LogFiles {
 /// Tracks the space that is left for the log, how fast the log grows, and whether it still exists.
 #[derive(Debug, Default)]
 pub(super) struct LogWatch {
-    /// The disk has been asked and has not answered.
+    /// A query of the disk is pending.
     pending: bool,
     due: Duration,
     /// When the files had how many bytes.
@@ -97,12 +97,12 @@ impl LogWatch {
         self.last.map_or(0, |(_, bytes)| bytes)
     }
 
-    /// Returns whether to ask the disk now: it has answered the last time.
+    /// Returns whether to query the disk now: the last query was answered.
     pub(super) fn begins(&mut self) -> bool {
         !std::mem::replace(&mut self.pending, true)
     }
 
-    /// Takes the answer of the disk about the files of the present log.
+    /// Stores the disk's answer about the files of the present log.
     pub(super) fn take(&mut self, found: &LogFiles, present: &Recorder, now: Duration) {
         self.pending = false;
         if found.path != present.path() {
@@ -178,7 +178,7 @@ pub(super) struct StationBook {
 }
 
 impl StationBook {
-    /// Opens a book. `about` says who writes it. Returns the book and its first record.
+    /// Opens a book. `about` names its writer. Returns the book and its first record.
     pub(super) fn open(key: Option<BookKey>, about: &str, unix_ns: u64) -> (Self, Record) {
         let key_words = match &key {
             Some(key) => format!("signed with the key of public key {}", key.public()),
@@ -216,21 +216,20 @@ impl StationBook {
 /// Longer files are no checklists.
 const BYTES_MAX: u64 = 64 * 1024;
 
-/// Keeps the signatures of one checklist. The file only grows.
+/// The stored signatures of one checklist. The file only grows.
 pub(super) struct SignatureFile {
     path: PathBuf,
     /// `None` before the first signature.
     file: Option<File>,
-    /// Open for its lock: it keeps other stations away while there is no file of signatures.
+    /// Open for its lock: it excludes other stations while there is no file of signatures.
     checklist: File,
     hash: String,
 }
 
-/// Opens a checklist, and marks what has been signed for it today. Also returns what to report to
-/// the crew.
+/// Opens a checklist, and marks the steps signed today. Also returns the warnings for the crew.
 ///
 /// # Errors
-/// The checklist is wrong, its signatures cannot be written, or another station keeps them.
+/// The checklist is wrong, its signatures cannot be written, or another station writes them.
 pub(super) fn open_checklist(
     path: &Path,
     now_unix_s: u64,
@@ -257,26 +256,26 @@ pub(super) fn open_checklist(
     };
     let Remembered { entries, outdated, broken } =
         remembered(&String::from_utf8_lossy(&list), &checklist.hash, now_unix_s);
-    let mut told = Vec::new();
+    let mut notes = Vec::new();
     for entry in &entries {
         checklist.apply(entry);
     }
     if outdated > 0 {
-        told.push(format!("{outdated} signatures of the checklist are not of today and do not count"));
+        notes.push(format!("{outdated} signatures of the checklist are not of today and do not count"));
     }
     if broken > 0 {
-        told.push(format!("{broken} entries of {} cannot be read and do not count", signed_path.display()));
+        notes.push(format!("{broken} entries of {} cannot be read and do not count", signed_path.display()));
     }
     let hash = checklist.hash.clone();
-    let kept = SignatureFile { path: signed_path.clone(), file, checklist: written, hash };
-    Ok((checklist, kept, told))
+    let signatures_file = SignatureFile { path: signed_path.clone(), file, checklist: written, hash };
+    Ok((checklist, signatures_file, notes))
 }
 
-/// Keeps other stations away from a file, as long as it is open.
+/// Locks a file against other stations while it is open.
 fn lock(file: &File, path: &Path) -> anyhow::Result<()> {
     file.try_lock().map_err(|error| match error {
         std::fs::TryLockError::WouldBlock => anyhow::anyhow!(
-            "another station keeps {}: attach a screen to it to sign (`ground attach`)",
+            "another station writes {}: attach a screen to it to sign (`ground attach`)",
             path.display()
         ),
         std::fs::TryLockError::Error(error) => {
@@ -287,7 +286,7 @@ fn lock(file: &File, path: &Path) -> anyhow::Result<()> {
 
 impl Drop for SignatureFile {
     /// A program that is being started has a copy of every open file until it runs, and a copy
-    /// keeps the lock.
+    /// holds the lock.
     fn drop(&mut self) {
         for file in self.file.iter().chain([&self.checklist]) {
             // The file is closed next, which unlocks it, too.
@@ -320,17 +319,18 @@ impl SignatureFile {
     }
 }
 
-// The files with the last place of a vehicle, beside the log, for each boot of a vehicle: one for a
-// restart, and a KML.
+// The files with the last position of a vehicle, beside the log, for each boot of a vehicle: one
+// for a restart, and a KML.
 
 /// What the names of the files begin with; the vehicle's boot number follows.
 const PLACE_NAME: &str = "touchdown-place-";
-/// Older places are of no use to somebody who looks for a vehicle today.
-const KEPT_FOR_S: u64 = 24 * 3_600;
-/// Longer files are none of ours.
+/// Maximum age of a stored position, s: an older one does not help to find a vehicle.
+const PLACE_VALID_S: u64 = 24 * 3_600;
+/// Longer files are not ours.
 const PLACE_BYTES_MAX: u64 = 64 * 1024;
 
-/// Writes both files. A file gets its name when it is complete, so a crash leaves the former place.
+/// Writes both files. A file gets its name when it is complete, so a crash leaves the former
+/// position.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -344,11 +344,11 @@ pub(super) fn write_place(folder: &Path, place: &LastPlace) -> anyhow::Result<()
 }
 
 fn write_one(folder: &Path, name: &str, text: &str) -> anyhow::Result<()> {
-    let (part, whole) = (folder.join(format!("{name}.part")), folder.join(name));
-    let failed = || format!("writing {}", whole.display());
+    let (part, complete) = (folder.join(format!("{name}.part")), folder.join(name));
+    let failed = || format!("writing {}", complete.display());
     let mut file = File::create(&part).with_context(failed)?;
     file.write_all(text.as_bytes()).with_context(failed)?;
-    fs::rename(&part, &whole).with_context(failed)
+    fs::rename(&part, &complete).with_context(failed)
 }
 
 /// The files of places in a folder.
@@ -358,34 +358,33 @@ fn place_files(folder: &Path) -> impl Iterator<Item = fs::DirEntry> {
     files.filter(|file| file.file_name().to_string_lossy().starts_with(PLACE_NAME))
 }
 
-/// The newest place that was kept in the folder of the log in the last day.
+/// The newest position stored in the folder of the log in the last day.
 pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<LastPlace> {
     let ours = place_files(folder?);
-    // What is no place, as a KML is none, is passed over.
+    // Other files, such as a KML, are skipped.
     let places = ours.filter_map(|file| {
         let place: LastPlace =
             serde_json::from_reader(File::open(file.path()).ok()?.take(PLACE_BYTES_MAX)).ok()?;
         Some(LastPlace { pad: place.pad.filter(|pad| pad.is_valid()), ..place })
     });
     places
-        .filter(|place| now_unix_s.saturating_sub(place.heard_unix_s) <= KEPT_FOR_S)
-        .max_by_key(|place| place.heard_unix_s)
+        .filter(|place| now_unix_s.saturating_sub(place.received_unix_s) <= PLACE_VALID_S)
+        .max_by_key(|place| place.received_unix_s)
 }
 
-// The file beside the log with what must not be forgotten when the station ends.
+// The file beside the log with the state that must survive the end of the station.
 
 const UNFINISHED_NAME: &str = "touchdown-unfinished.json";
 
-/// Stores what is unfinished now.
+/// Stores the unfinished state.
 ///
 /// # Errors
 /// The folder cannot be written.
-pub(super) fn write_unfinished(folder: &Path, kept: &Unfinished) -> anyhow::Result<()> {
-    write_one(folder, UNFINISHED_NAME, &serde_json::to_string(kept)?)
+pub(super) fn write_unfinished(folder: &Path, unfinished: &Unfinished) -> anyhow::Result<()> {
+    write_one(folder, UNFINISHED_NAME, &serde_json::to_string(unfinished)?)
 }
 
-/// What an earlier run has left unfinished in this folder; `None` if no vehicle has flown from
-/// here.
+/// The unfinished state of an earlier run in this folder; `None` if no vehicle has flown from here.
 ///
 /// # Errors
 /// The file is damaged, or it is missing beside the position of a vehicle, with which it is
@@ -430,21 +429,21 @@ mod log_tests {
 
     /// The same command again after a crash.
     #[test]
-    fn a_log_that_exists_is_kept_and_the_new_one_says_its_free_name() {
+    fn an_existing_log_is_preserved_and_the_new_one_reports_its_name() {
         let directory = tempfile::tempdir().unwrap();
         let header = LogHeader::default();
-        let asked = directory.path().join("flight.mcap");
-        let choice = Some(LogChoice::File(asked.clone()));
+        let named = directory.path().join("flight.mcap");
+        let choice = Some(LogChoice::File(named.clone()));
         let open = || open_log(choice.as_ref(), true, &header).unwrap().unwrap().finish().unwrap();
-        assert_eq!(open(), asked);
-        assert_eq!(other_name(choice.as_ref(), Some(&asked)), None);
-        let before = fs::read(&asked).unwrap();
+        assert_eq!(open(), named);
+        assert_eq!(other_name(choice.as_ref(), Some(&named)), None);
+        let before = fs::read(&named).unwrap();
         // A telemetry log alone also takes its name.
         fs::write(directory.path().join("flight-2.tlog"), "somebody's").unwrap();
         let free = directory.path().join("flight-3.mcap");
         assert_eq!(open(), free);
         assert!(free.with_extension("tlog").exists() && !directory.path().join("flight-2.mcap").exists());
-        assert_eq!(fs::read(&asked).unwrap(), before);
+        assert_eq!(fs::read(&named).unwrap(), before);
         let said = other_name(choice.as_ref(), Some(&free)).unwrap();
         assert!(
             said.contains("flight.mcap exists and is kept; ") && said.ends_with("flight-3.mcap is written")
@@ -508,25 +507,25 @@ mod checklist_tests {
         let now = 1_800_000_000;
         let signature = Signature { by: "Ann".to_owned(), unix_s: now, ..Signature::default() };
         let entry = ChecklistEntry::Marked { step: 2, mark: Mark::Signed(signature.clone()) };
-        let (list, mut kept, told) = open_checklist(&path, now).unwrap();
-        assert!(!list.is_touched() && told.is_empty());
+        let (list, mut signatures, notes) = open_checklist(&path, now).unwrap();
+        assert!(!list.is_touched() && notes.is_empty());
         let another = || open_checklist(&path, now).map(|_| ()).unwrap_err().to_string();
-        let keeps = format!("another station keeps {}", path.display());
-        let keeps = format!("{keeps}: attach a screen to it to sign (`ground attach`)");
-        assert_eq!(another(), keeps);
+        let refusal = format!("another station writes {}", path.display());
+        let refusal = format!("{refusal}: attach a screen to it to sign (`ground attach`)");
+        assert_eq!(another(), refusal);
         let signed = folder.path().join("list.toml.signed");
         assert!(!signed.exists(), "nothing is signed");
-        kept.add(&entry).unwrap();
+        signatures.add(&entry).unwrap();
         assert!(signed.exists());
-        assert_eq!(another(), keeps);
-        drop(kept);
-        let (list, kept, _) = open_checklist(&path, now + 60).unwrap();
+        assert_eq!(another(), refusal);
+        drop(signatures);
+        let (list, signatures, _) = open_checklist(&path, now + 60).unwrap();
         assert_eq!(list.steps[2].mark, Mark::Signed(signature));
-        drop(kept);
-        let (list, kept, told) = open_checklist(&path, now + 13 * 3_600).unwrap();
+        drop(signatures);
+        let (list, signatures, notes) = open_checklist(&path, now + 13 * 3_600).unwrap();
         assert!(!list.is_touched());
-        assert!(told[0].starts_with("1 signatures of the checklist are not of today"), "{told:?}");
-        drop(kept);
+        assert!(notes[0].starts_with("1 signatures of the checklist are not of today"), "{notes:?}");
+        drop(signatures);
         let edited = include_str!("../../checklist-example.toml").replace("3.0", "30.0");
         std::fs::write(&path, edited).unwrap();
         assert!(!open_checklist(&path, now + 60).unwrap().0.is_touched(), "it was signed for another text");
@@ -542,24 +541,24 @@ mod places_tests {
     fn the_newest_place_of_today_survives_a_restart() {
         let folder = tempfile::tempdir().unwrap();
         let now = 1_800_000_000;
-        let place = |boot, heard_unix_s| LastPlace {
+        let place = |boot, received_unix_s| LastPlace {
             boot,
-            heard_unix_s,
-            heard: Spot { north_m: 1.0, east_m: 2.0, error_m: 3.0 },
+            received_unix_s,
+            received: Spot { north_m: 1.0, east_m: 2.0, error_m: 3.0 },
             height_m: 4.0,
             predicted: None,
             pad: Some(Degrees { latitude: 35.0, longitude: -117.0 }),
         };
         assert_eq!(newest_place(Some(folder.path()), now), None);
-        for (boot, heard) in [(1, now - 100), (2, now - 50), (3, now - 2 * KEPT_FOR_S)] {
-            write_place(folder.path(), &place(boot, heard)).unwrap();
+        for (boot, received) in [(1, now - 100), (2, now - 50), (3, now - 2 * PLACE_VALID_S)] {
+            write_place(folder.path(), &place(boot, received)).unwrap();
         }
         // The place of a vehicle is written again and again.
         write_place(folder.path(), &place(2, now - 10)).unwrap();
         fs::write(folder.path().join(format!("{PLACE_NAME}broken.json")), "{").unwrap();
         assert_eq!(newest_place(Some(folder.path()), now), Some(place(2, now - 10)));
         let kml = fs::read_to_string(folder.path().join(format!("{PLACE_NAME}00000002.kml"))).unwrap();
-        assert!(kml.contains("<name>last heard</name>"));
+        assert!(kml.contains("<name>last received</name>"));
         let parts = fs::read_dir(folder.path()).unwrap().filter_map(Result::ok);
         assert_eq!(parts.filter(|file| file.path().extension().is_some_and(|end| end == "part")).count(), 0);
     }

@@ -60,12 +60,12 @@ use wire::Wire;
 
 const AUTO_TIME_LIMIT: Duration = Duration::from_mins(2);
 
-/// Who watches over a station, and for how long.
+/// How a station runs, and for how long.
 #[derive(Debug, Clone, Copy)]
 struct Duty {
     /// It runs on after a flight, and serves screens also in a demonstration.
     is_daemon: bool,
-    /// It has a screen of its own.
+    /// It has a local screen.
     interactive: bool,
     time_limit: Option<Duration>,
     /// It prints one object at its end, and nothing else.
@@ -86,16 +86,16 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
         let without = (cli.shown.color == ColorChoice::Never).then_some(Palette::None);
         Ok(Config { theme: without.or(config.theme), ..config })
     };
-    let said = |bytes: &[u8]| print(bytes).map(|()| Exit::Yes);
+    let printed = |bytes: &[u8]| print(bytes).map(|()| Exit::Yes);
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_all().build().context("making the run loop")?;
     match cli.command {
-        Some(Command::Config { command: ConfigCommand::Example }) => said(EXAMPLE.as_bytes()),
+        Some(Command::Config { command: ConfigCommand::Example }) => printed(EXAMPLE.as_bytes()),
         Some(Command::Config { command: ConfigCommand::Check { file } }) => {
             Config::load(file.as_deref())?;
             let file = file.or_else(usual_path).filter(|path| path.exists());
             let none = || "no settings file: the defaults of `ground config example` hold\n".to_owned();
-            said(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
+            printed(file.map_or_else(none, |path| format!("{}: valid\n", path.display())).as_bytes())
         }
         Some(Command::Manual(manual)) => manual.print(Cli::command()).context("printing the manual"),
         Some(Command::Status { json }) => runtime.block_on(stations::list(json)),
@@ -112,7 +112,7 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
                 args.operator.operator.or(config.flags.link.operator.operator.clone()),
             );
             let viewer = Viewer {
-                // Nobody can command without keys.
+                // Commanding needs keys.
                 watch: args.watch || !interactive,
                 operator: operator(who.as_deref()),
                 talk: config.talk(),
@@ -216,7 +216,7 @@ async fn start(
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist =
         args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
-    // A demonstration flies it, so it cannot fly another.
+    // A demonstration flies this mission, so it cannot fly another.
     let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
     let mission = named.map(load_flight).transpose()?;
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
@@ -266,14 +266,14 @@ async fn start(
     });
     let renamed = other_name(args.flags.log.as_ref(), recorder.as_ref().map(Recorder::path));
     announce(&mut model, auto, renamed, clock.now());
-    let signatures = checklist.map(|(list, file, told)| {
+    let signatures = checklist.map(|(list, file, notes)| {
         model.checklist = Some(list);
-        for text in told {
+        for text in notes {
             model.warn(clock.now(), text);
         }
         Arc::new(Mutex::new(file))
     });
-    go_on_with_what_is_kept(&mut model, recorder.as_ref(), clock.now());
+    restore_unfinished(&mut model, recorder.as_ref(), clock.now());
     let server = serve(args, &mut model, duty, &clock).await?;
     let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
     model.repeats_reported = output.reports_repeats();
@@ -289,7 +289,7 @@ async fn start(
         server,
         screens: Vec::new(),
         alarm_command: config.alarm_command.clone(),
-        own: Answers::default(),
+        local_screen: Answers::default(),
         signatures,
         book: None,
         report: None,
@@ -300,16 +300,15 @@ async fn start(
         next_log,
     };
     station.open_book(&model, "");
-    station.publish_kept(&model, clock.now());
+    station.publish_stored(&model, clock.now());
     Ok((station, model, wire))
 }
 
-/// Says what the demonstration is, before anything else, and if the log has another name than was
-/// asked for.
+/// Reports the demonstration, before anything else, and a log name that differs from the given one.
 fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duration) {
     if let Some(name) = &model.settings.vehicle_name {
-        let by_whom = if auto { "it arms and starts itself" } else { "you arm and start it" };
-        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {by_whom}");
+        let starter = if auto { "it arms and starts itself" } else { "you arm and start it" };
+        let text = format!("demonstration: a simulated vehicle in this program flies {name}; {starter}");
         model.info(now, text);
     }
     if let Some(words) = renamed {
@@ -317,22 +316,23 @@ fn announce(model: &mut Model, auto: bool, renamed: Option<String>, now: Duratio
     }
 }
 
-/// Takes what an earlier run has kept beside its log.
-fn go_on_with_what_is_kept(model: &mut Model, log: Option<&Recorder>, now: Duration) {
+/// Restores the state that an earlier run has stored beside its log.
+fn restore_unfinished(model: &mut Model, log: Option<&Recorder>, now: Duration) {
     let (folder, unix_s) = (log.and_then(|log| log.path().parent()), model.settings.start_unix_s);
     model.place = newest_place(folder, unix_s);
     if !model.settings.demonstration {
-        let kept = read_unfinished(folder).unwrap_or_else(|why| {
-            let text = format!("what the last run left unfinished is not known, so people wait: {why:#}");
-            model.say(now, Speaker::Ground, EventLevel::Error, text);
+        let unfinished = read_unfinished(folder).unwrap_or_else(|why| {
+            let text =
+                format!("the unfinished state of the last run cannot be read, so people wait: {why:#}");
+            model.add_event(now, Speaker::Ground, EventLevel::Error, text);
             Some(Unfinished { abort: None, danger: Some(Danger::NotReported) })
         });
-        if let Some(kept) = kept {
-            model.take_unfinished(kept, now);
+        if let Some(unfinished) = unfinished {
+            model.take_unfinished(unfinished, now);
         }
     }
     if model.place.is_some() {
-        model.info(now, "the last place of a vehicle is kept from before: page Find");
+        model.info(now, "the last position of a vehicle is stored from before: page Find");
     }
 }
 
@@ -371,7 +371,7 @@ pub(super) fn operator(named: Option<&str>) -> String {
 
 // The keys of a station: the one that all share, and that of the operator who sits here.
 
-/// A key file with its timestamps, what it signs and checks, and whose it is.
+/// A key file with its timestamps, its signing state, and its owner.
 pub(super) struct KeyRing {
     pub(super) key: Option<(KeyFile, Signing)>,
     pub(super) owner: Option<KeyOwner>,
@@ -385,7 +385,7 @@ impl KeyRing {
     /// Reads the keys. An operator's frames have timestamps of their own, beside their key.
     ///
     /// # Errors
-    /// A file cannot be read, others can read it, or the crew has nobody of this name.
+    /// A file cannot be read, others can read it, or the crew has no member of this name.
     pub(super) fn open(link: &LinkArgs) -> anyhow::Result<Self> {
         let Some(shared) = link.key.as_deref() else {
             anyhow::ensure!(

@@ -1,9 +1,7 @@
-//! Ends the log of a station that runs for days, and begins the next one beside it, while nobody
-//! flies; also one whose files somebody has removed.
-//!
-//! Everything that records does so in the run loop, so no frame comes between the two logs: the one
-//! before has all until then, the next one all after it. The book is closed in the one and opened
-//! in the other, whose first entry names the log before and the end of its book.
+//! Ends the log of a station that runs for days, and begins the next one beside it, while no
+//! vehicle flies; also a log whose files were removed. All records are made in the run loop, so no
+//! frame falls between the two logs. The book is closed in the one and opened in the other, whose
+//! first entry names the log before and the end of its book.
 
 use std::path::Path;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -30,7 +28,7 @@ const LONG_BYTES: u64 = 512 << 20;
 /// If no next log can be created, it is tried again after this time.
 const AGAIN_AFTER: Duration = Duration::from_hours(1);
 
-/// What the next log needs.
+/// The parts of the next log.
 #[derive(Default)]
 pub(super) struct NextLog {
     /// The name that was given.
@@ -52,7 +50,7 @@ impl NextLog {
         Self { name: args.flags.log.clone(), header, guarded, ..Self::default() }
     }
 
-    /// The log that is written; `None` if none is wanted.
+    /// The present log; `None` if none is wanted.
     pub(super) fn guarded(&self) -> MutexGuard<'_, Option<Recorder>> {
         self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -63,9 +61,9 @@ fn file_name(path: &Path) -> String {
 }
 
 impl Station {
-    /// Begins the next log if the present one is long and nobody flies, or at once if it was
-    /// removed.
-    pub(super) fn keep_logs_short(&mut self, model: &mut Model) {
+    /// Begins the next log if the present one is long and no vehicle flies, or immediately if it
+    /// was removed.
+    pub(super) fn rotate_log(&mut self, model: &mut Model) {
         let now = self.clock.now();
         let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
         if let Some(Ok(ended)) = &ended {
@@ -76,8 +74,7 @@ impl Station {
         }
         let is_long = self.log_watch.bytes() >= LONG_BYTES;
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
-        // A demonstration has one log, which its vehicle writes, too: that is written again at the
-        // end.
+        // A demonstration has one log, shared with its vehicle: it is written again at the end.
         let is_removed = model.log.removed && self.log_watch.removed && !model.settings.demonstration;
         if !waits && (is_removed || is_long && model.may_change_log(now)) {
             self.begin_next_log();
@@ -116,7 +113,7 @@ impl Station {
         };
         let Some(before) = &self.recorder else { return };
         let before_name = file_name(before.path());
-        self.close_book(&format!("the log goes on in {}", file_name(next.path())), model, wire);
+        self.close_book(&format!("the log continues in {}", file_name(next.path())), model, wire);
         let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
         let before = self.next_log.guarded().replace(next.clone());
         wire.recorder = Some(next.clone());
@@ -185,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn no_frame_is_lost_between_two_logs_and_both_books_are_whole() {
+    fn no_frame_is_lost_between_two_logs_and_both_books_are_complete() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
         let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -210,7 +207,7 @@ mod tests {
                 }
             };
             say(&mut wire);
-            station.keep_logs_short(&mut model);
+            station.rotate_log(&mut model);
             assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
             change_log(&mut station, &mut model, &mut wire);
             say(&mut wire);

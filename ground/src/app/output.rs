@@ -59,7 +59,7 @@ impl Output {
         }
     }
 
-    /// Whether the terminal has shown since the last call that it takes what is written.
+    /// Whether the terminal has answered since the last call.
     pub(super) fn answers(&mut self, now: Duration) -> bool {
         self.screen.as_mut().is_some_and(|screen| screen.answers(now))
     }
@@ -76,7 +76,7 @@ impl Output {
         }
     }
 
-    /// Does an action that is a screen's own.
+    /// Executes an action of a screen.
     pub(super) fn act(&mut self, action: &Action, model: &mut Model, now: Duration) {
         let Some(screen) = &mut self.screen else { return };
         match action {
@@ -86,7 +86,7 @@ impl Output {
                 screen.pace.mark_changed();
             }
             Action::Bell => screen.bell(),
-            Action::Say(text) if screen.say(text) => {
+            Action::CallOut(text) if screen.call_out(text) => {
                 model.warn(now, "the voice command has ended; nothing is called out any more");
             }
             _ => {}
@@ -117,7 +117,7 @@ pub struct Lines {
     closed: bool,
     /// Texts that found no room since the last one that did.
     lost: u64,
-    /// Prints in a thread: a pipe that nobody empties must delay neither the link nor the screen.
+    /// Prints in a thread: a full pipe must delay neither the link nor the screen.
     printer: Option<Background<u64, bool>>,
 }
 
@@ -127,12 +127,12 @@ impl Lines {
         Self { seen: model.events.total(), closed: false, lost: 0, printer: None }
     }
 
-    /// Prints nothing: nobody reads the output.
+    /// Prints nothing: the output has no reader.
     pub fn closed() -> Self {
         Self { seen: 0, closed: true, lost: 0, printer: None }
     }
 
-    /// Prints the new events. If nobody reads the output any more, printing stops and the flight
+    /// Prints the new events. Once the output has no reader, printing stops and the flight
     /// continues.
     pub fn show(&mut self, model: &Model) {
         if self.closed || is_quiet() || self.seen == model.events.total() {
@@ -147,7 +147,7 @@ impl Lines {
         }
         self.seen = model.events.total();
         if self.lost > 0 {
-            text.insert_str(0, &format!("{} messages were not printed: nobody read them\n", self.lost));
+            text.insert_str(0, &format!("{} messages were not printed: the output is blocked\n", self.lost));
         }
         if self.printer.is_none() {
             self.printer = Background::start("lines").ok();
@@ -161,7 +161,7 @@ impl Lines {
 
 /// How long the last lines may take at the end.
 const PRINTED_WITHIN: Duration = Duration::from_secs(1);
-/// Set once the output takes no more: printing to it would wait for ever.
+/// Set once the output is blocked: printing to it would wait for ever.
 static STUCK: AtomicBool = AtomicBool::new(false);
 
 impl Drop for Lines {
@@ -172,13 +172,13 @@ impl Drop for Lines {
     }
 }
 
-/// Whether an event is about the flight rather than about how it was commanded: a demonstration
-/// without a screen is read by somebody who wants to see what flies. The log has every event.
+/// Whether an event is about the flight rather than about its commands: the reader of a
+/// demonstration without a screen wants to see the flight. The log has every event.
 fn is_of_the_flight(event: &Event) -> bool {
-    let told = ["demonstration", "phase ", Ending::Stands.word()];
+    let of_interest = ["demonstration", "phase ", Ending::Stands.word()];
     let by_ground = event.speaker == Speaker::Ground && event.level == EventLevel::Info;
     let of_the_solver = event.text.starts_with("controller level");
-    (!by_ground || told.iter().any(|words| event.text.starts_with(words))) && !of_the_solver
+    (!by_ground || of_interest.iter().any(|words| event.text.starts_with(words))) && !of_the_solver
 }
 
 /// A path that is the same wherever it is read.
@@ -186,7 +186,7 @@ pub(super) fn absolute(path: &str) -> String {
     std::path::absolute(path).map_or_else(|_no_folder| path.to_owned(), |path| path.display().to_string())
 }
 
-/// What a station without a screen says at once: its links, its log, and what to type next.
+/// The first output of a station without a screen: its links, its log, and the next commands.
 pub(super) fn greeting(model: &Model) -> String {
     let link = &model.settings.link_name;
     let log = model.settings.log_path.as_deref().map_or_else(|| "none".to_owned(), absolute);
@@ -210,7 +210,7 @@ pub fn closing(
         None if !interactive => text.push_str("no landing verdict\n"),
         None => {}
     }
-    // The last warning before somebody approaches the vehicle.
+    // The last warning before a person approaches the vehicle.
     if let Some(words) = headline::banner(model, now) {
         let _ = writeln!(text, "{}", words.sentence());
     }
@@ -226,12 +226,12 @@ pub fn closing(
     if let Ok(Some(path)) = log_path {
         if let Some(head) = model.book.short() {
             let signed = if model.book.is_signed { "signed" } else { "not signed (--key)" };
-            let kept = model.book.kept;
-            let _ = writeln!(text, "book: {head}, {signed}; the vehicle confirmed {kept} entries");
+            let confirmed = model.book.confirmed;
+            let _ = writeln!(text, "book: {head}, {signed}; the vehicle confirmed {confirmed} entries");
         }
         let _ = writeln!(text, "log: {}", path.display());
     }
-    // The exit code is decided even if nobody reads this.
+    // The exit code is decided even if this cannot be printed.
     let _ = print(text.as_bytes());
 }
 
@@ -249,7 +249,7 @@ pub(super) fn ended(model: &Model, exit: Exit, log: Option<&PathBuf>, now: Durat
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
     let mut text = String::from("touchdown, against the design envelope of its legs\n");
     for row in limit_rows(&verdict.touchdown, model.vehicle.limits().as_ref()) {
-        let word = if row.kept { "ok" } else { "NO" };
+        let word = if row.is_met { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(text, "  {word} {:<8} {value:>9} {:<6} {}", row.name, row.unit, row.limit);
     }

@@ -98,14 +98,15 @@ pub struct Pace {
     /// Whether the next frame is drawn although the line is busy.
     urgent: bool,
     /// Whether it has new pictures in any case.
-    whole: bool,
+    with_pictures: bool,
     pictures: Option<Pictures>,
     cells: u32,
-    /// When the terminal was asked, if it has not answered yet; and how long its last answer took.
-    asked: Option<Duration>,
+    /// When the terminal was queried, if it has not answered yet; and how long its last answer
+    /// took.
+    queried_at: Option<Duration>,
     took: Option<Duration>,
-    /// Bytes of the frame that was written with the open question.
-    asked_bytes: usize,
+    /// Bytes of the frame that was written with the open query.
+    query_bytes: usize,
     /// Whether the terminal takes a frame as soon as it is written.
     is_fast: bool,
     /// Answers show nothing about the line.
@@ -125,10 +126,10 @@ impl Pace {
         self.is_fast &= self.waits(now).is_none_or(|waits| waits <= SLOW);
     }
 
-    /// A person has done something and waits for the result.
+    /// A person has pressed a key and waits for the result.
     pub fn mark_changed(&mut self) {
         self.mark_urgent();
-        self.whole = true;
+        self.with_pictures = true;
     }
 
     fn mark_urgent(&mut self) {
@@ -140,7 +141,11 @@ impl Pace {
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
         match msg {
             // These change nothing that must be drawn within the next second.
-            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::HeardOver(_) | Msg::HeardFrom(_) => {}
+            Msg::Tick
+            | Msg::Sent { .. }
+            | Msg::Links { .. }
+            | Msg::ReceivedOver(_)
+            | Msg::ReceivedFrom(_) => {}
             Msg::Frame(_) | Msg::Received { .. }
                 if model.vehicle.in_flight() || model.vehicle.counts_down() =>
             {
@@ -176,7 +181,7 @@ impl Pace {
             let waits = |before: &Pictures| {
                 !is_fast && Some(before.place) == place && now < before.drawn_at + PICTURES
             };
-            self.pictures = match self.pictures.take().filter(|before| !self.whole && waits(before)) {
+            self.pictures = match self.pictures.take().filter(|before| !self.with_pictures && waits(before)) {
                 Some(before) => {
                     frame.buffer_mut().merge(&before.cells);
                     Some(before)
@@ -213,38 +218,38 @@ impl Pace {
         room_at
     }
 
-    /// Whether the terminal is to be asked, behind all that was written, to answer: one question at
-    /// a time, so that a lost answer is only lost.
-    pub fn asks(&mut self, now: Duration) -> bool {
-        let asks = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
-        if asks {
-            self.asked = Some(now);
+    /// Returns whether to query the terminal behind the written frame: one query at a time, so that
+    /// a lost answer has no further effect.
+    pub fn begins_query(&mut self, now: Duration) -> bool {
+        let begins = self.waits(now).is_none_or(|waits| waits > LOST_AFTER);
+        if begins {
+            self.queried_at = Some(now);
             let with_it = self.written.back().filter(|(at, _)| *at == now);
-            self.asked_bytes = with_it.map_or(0, |(_, bytes)| *bytes);
+            self.query_bytes = with_it.map_or(0, |(_, bytes)| *bytes);
         }
-        asks
+        begins
     }
 
     /// The terminal has answered.
     pub fn answered(&mut self, now: Duration) {
         let took = self.waits(now).unwrap_or(Duration::ZERO);
         // A few bytes pass any line quickly.
-        let is_proven = self.asked.is_some() && self.asked_bytes >= FAST_BYTES && took <= FAST;
+        let is_proven = self.queried_at.is_some() && self.query_bytes >= FAST_BYTES && took <= FAST;
         self.is_fast = took <= SLOW && (self.is_fast || is_proven && !self.never_fast);
         self.took = Some(took);
-        self.asked = None;
+        self.queried_at = None;
     }
 
     fn waits(&self, now: Duration) -> Option<Duration> {
-        self.asked.map(|asked| now.saturating_sub(asked))
+        self.queried_at.map(|at| now.saturating_sub(at))
     }
 
-    /// How old what the terminal shows is; zero for one that has never answered.
+    /// Age of the shown frame; zero for a terminal that has never answered.
     pub fn late(&self, now: Duration) -> Duration {
         self.took.map_or(Duration::ZERO, |took| took.max(self.waits(now).unwrap_or(Duration::ZERO)))
     }
 
-    /// Whether so much of what was written waits that a new frame would only wait behind it.
+    /// Whether written frames still wait, so that a new frame would only wait behind them.
     pub fn waits_for_terminal(&self, now: Duration) -> bool {
         self.took.is_some() && self.waits(now).is_some_and(|waits| (LATE..LOST_AFTER).contains(&waits))
     }
@@ -257,7 +262,7 @@ impl Pace {
     /// A frame of this many cells and bytes was drawn.
     pub fn drew(&mut self, model: &Model, cells: u32, bytes: usize, now: Duration) {
         (self.drawn_at, self.wait) = (Some(now), IDLE_FRAME);
-        (self.urgent, self.whole) = (false, false);
+        (self.urgent, self.with_pictures) = (false, false);
         self.drawn = Some(Urgent::of(model));
         self.cells = cells;
         if self.is_fast && (model.vehicle.in_flight() || model.vehicle.counts_down()) {

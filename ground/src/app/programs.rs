@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
-/// How many callouts wait for the command; further ones are dropped, because late words mislead.
+/// Number of callouts that wait for the command; further ones are dropped, because late words
+/// mislead.
 const WAITING_MAX: usize = 4;
 
-/// Passes lines to the command from a thread of its own, so that a command that hangs delays
-/// nothing.
+/// Passes lines to the command from a separate thread, so that a hanging command delays nothing.
 #[derive(Debug)]
 pub struct Voice(SyncSender<String>);
 
@@ -34,9 +34,9 @@ impl Voice {
         Ok(Self(lines))
     }
 
-    /// Says a line, unless the command is too far behind. It never waits. Returns false once the
-    /// command has ended.
-    pub fn say(&self, line: &str) -> bool {
+    /// Calls a line out, unless the command is too far behind. It never waits. Returns false once
+    /// the command has ended.
+    pub fn call_out(&self, line: &str) -> bool {
         !matches!(self.0.try_send(format!("{line}\n")), Err(TrySendError::Disconnected(_)))
     }
 }
@@ -53,7 +53,7 @@ fn speak(mut child: Child, lines: &Receiver<String>) {
     let _ = child.wait();
 }
 
-// Runs the command that reports an alarm to people who are not at the screen.
+// Runs the command that reports an alarm to people away from the screen.
 
 /// Runs the command with `sh -c` and the text of the alarm in `TOUCHDOWN_ALARM`, in a thread: the
 /// disk may be slow to start it. The receiver gets the error if it cannot be started.
@@ -70,7 +70,7 @@ pub(super) fn run_alarm_command(command: &str, alarm: &str) -> io::Result<Receiv
 
 // Writes the report of the flight: runs `replay report` on the station's log.
 
-/// Does what takes a while in a thread of its own; the result comes when it is there.
+/// Runs slow work in a separate thread; the receiver gets its result.
 ///
 /// # Errors
 /// No thread can be started.
@@ -78,10 +78,10 @@ pub(super) fn in_a_thread<T: Send + 'static>(
     name: &str,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> io::Result<Receiver<T>> {
-    let (tell, told) = sync_channel(1);
-    // Nobody may be waiting any more.
-    let work = move || drop(tell.send(work()));
-    std::thread::Builder::new().name(name.to_owned()).spawn(work).map(|_| told)
+    let (sender, receiver) = sync_channel(1);
+    // The receiver may have been dropped.
+    let work = move || drop(sender.send(work()));
+    std::thread::Builder::new().name(name.to_owned()).spawn(work).map(|_| receiver)
 }
 
 /// Writes the report beside the log; `replay` gives it a name that is free. Returns its path.
@@ -90,7 +90,7 @@ pub(super) fn in_a_thread<T: Send + 'static>(
 /// `replay` cannot be started, or its last line.
 pub(super) fn write_report(log: &Path) -> Result<String, String> {
     // The program beside this one, otherwise the one that the shell would find.
-    let beside = std::env::current_exe().ok().map(|own| own.with_file_name("replay"));
+    let beside = std::env::current_exe().ok().map(|program| program.with_file_name("replay"));
     let program = beside.filter(|program| program.exists()).unwrap_or_else(|| PathBuf::from("replay"));
     let ran = Command::new(&program)
         .args(["report".as_ref(), log.as_os_str()])
@@ -111,13 +111,13 @@ mod voice_tests {
     #[test]
     fn every_line_reaches_the_command_as_it_is() {
         let folder = tempfile::tempdir().unwrap();
-        let heard = folder.path().join("heard");
-        let voice = Voice::start(&format!("tee {}", heard.display())).unwrap();
+        let spoken = folder.path().join("spoken");
+        let voice = Voice::start(&format!("tee {}", spoken.display())).unwrap();
         for line in ["liftoff", "$(reboot); `x` | y"] {
-            assert!(voice.say(line));
+            assert!(voice.call_out(line));
         }
         drop(voice);
-        let written = || std::fs::read_to_string(&heard).unwrap_or_default();
+        let written = || std::fs::read_to_string(&spoken).unwrap_or_default();
         // The command writes when it is scheduled: this bound is some ten seconds.
         for _ in 0..1_000_000 {
             if written().lines().count() == 2 {
@@ -133,7 +133,7 @@ mod voice_tests {
     fn a_command_that_never_reads_delays_nothing() {
         let voice = Voice::start("sleep 3").unwrap();
         for _ in 0..100_000 {
-            voice.say("150 metres");
+            voice.call_out("150 metres");
         }
     }
 
@@ -142,10 +142,10 @@ mod voice_tests {
         assert!(Voice::start("no-such-command-anywhere").is_err());
         assert!(Voice::start(" ").is_err());
         let voice = Voice::start("true").unwrap();
-        while voice.say("anybody there?") {
+        while voice.call_out("anybody there?") {
             std::thread::yield_now();
         }
-        assert!(!voice.say("nobody"));
+        assert!(!voice.call_out("test"));
     }
 }
 
@@ -154,12 +154,12 @@ mod report_tests {
     use super::*;
 
     #[test]
-    fn a_report_replaces_none_and_a_wrong_log_is_told() {
+    fn a_report_replaces_no_file_and_a_wrong_log_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let log = folder.path().join("flight.mcap");
         std::fs::write(folder.path().join("flight.html"), "").unwrap();
-        let told = write_report(&log);
-        assert!(told.is_err(), "there is no such log: {told:?}");
+        let receiver = write_report(&log);
+        assert!(receiver.is_err(), "there is no such log: {receiver:?}");
         assert_eq!(std::fs::read_to_string(folder.path().join("flight.html")).unwrap(), "");
     }
 }

@@ -84,7 +84,7 @@ fn settings(log: &str) -> Settings {
     Settings { log_path: Some(log.to_owned()), role: Role::Replaying, ..Settings::on_screen(log) }
 }
 
-/// Says that a large log takes a while.
+/// Announces that a large log takes a while.
 fn announce(path: &Path) {
     const LARGE_BYTES: u64 = 32_000_000;
     let bytes = std::fs::metadata(path).map_or(0, |about| about.len());
@@ -132,13 +132,13 @@ async fn watch(player: &mut Player, config: &Config) -> anyhow::Result<()> {
     }
 }
 
-/// Gives a replay what was typed. Returns what the screen has to do: what the ground did is part of
-/// the recording. Held or pasted keys count only if they scroll or move the time.
+/// Applies typed keys to a replay. Returns the actions for the screen: the ground's actions are
+/// part of the recording. Held or pasted keys count only if they scroll or move the time.
 fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
     let Msg::Keys(keys) = msg else { return Vec::new() };
     let mut actions = Vec::new();
     for key in keys {
-        // What is typed as a text may come faster.
+        // Letters of a text may come faster.
         if keys.len() == 1 || key.scrolls() || player.model.pages.entry.is_some() {
             actions.extend(player.on_key(*key));
         }

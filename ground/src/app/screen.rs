@@ -47,11 +47,11 @@ const QUIET_WITHIN: Duration = Duration::from_secs(2);
 /// The smallest screen that counts, columns and rows: it has room for an alarm and the keys.
 const LEAST: (u16, u16) = (20, 5);
 
-/// How often the terminal is asked whether it answers.
-const ASK_EVERY: Duration = Duration::from_millis(250);
+/// Interval of the queries to the terminal.
+const QUERY_EVERY: Duration = Duration::from_millis(250);
 
 /// The reason when a screen ends without a signal.
-pub const GONE: &str = "the terminal is gone";
+pub const TERMINAL_LOST: &str = "the terminal is gone";
 
 /// Whether the terminal is in full-screen mode. It is restored only once: leaving the alternate
 /// screen twice would move the cursor, and the next output would overwrite a panic message.
@@ -61,7 +61,7 @@ static KEYBOARD_ENHANCED: AtomicBool = AtomicBool::new(false);
 
 /// The terminal in full-screen mode; restored when it goes out of scope, also during a panic.
 pub struct Screen {
-    /// Never dropped: its own clean-up would print to a terminal that may be gone, and panic.
+    /// Never dropped: its clean-up would print to a terminal that may be lost, and panic.
     /// [`restore`] does the clean-up.
     terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
@@ -71,12 +71,12 @@ pub struct Screen {
     voice: Option<Voice>,
     pub pace: Pace,
     /// Whether the next frame is written completely.
-    whole: bool,
+    redraws_all: bool,
     /// A message that arrived after the keys that are passed on first.
     waiting: Option<Msg>,
     input_ended: bool,
-    ask_at: Duration,
-    /// The terminal has answered, and [`Self::answers`] has not said so yet.
+    query_at: Duration,
+    /// The terminal has answered, and [`Self::answers`] has not reported it yet.
     has_answered: bool,
 }
 
@@ -100,10 +100,10 @@ impl Screen {
             bell: config.bell.unwrap_or(true),
             voice,
             pace: Pace::new(is_answered_by_another()),
-            whole: false,
+            redraws_all: false,
             waiting: None,
             input_ended: false,
-            ask_at: Duration::ZERO,
+            query_at: Duration::ZERO,
             has_answered: false,
         })
     }
@@ -122,28 +122,28 @@ impl Screen {
             self.pace.postpone(now);
             return Ok(());
         }
-        if std::mem::take(&mut self.whole) {
-            // `Terminal::clear` is not used: it asks for the cursor position and blocks for two
-            // seconds, because our own key reader takes the answer.
+        if std::mem::take(&mut self.redraws_all) {
+            // `Terminal::clear` is not used: it queries the cursor position and blocks for two
+            // seconds, because our key reader takes the answer.
             let size = self.terminal.size()?;
             self.terminal.resize(size.into())?;
         }
         let drawn = self.pace.draw(&mut self.terminal, model, self.theme, (now, model_now))?;
         let cells = drawn.area.area();
         self.pace.drew(model, cells, self.writer.waiting(), now);
-        self.ask(now);
+        self.query(now);
         Ok(())
     }
 
-    /// Forgets what the terminal shows, so that the next frame is written completely.
+    /// Drops the stored screen content, so that the next frame is written completely.
     pub fn clear(&mut self) {
-        self.whole = true;
+        self.redraws_all = true;
         self.pace.mark_changed();
     }
 
-    /// Calls a text out. Returns whether it was found that the voice command has ended.
-    pub fn say(&mut self, text: &str) -> bool {
-        self.voice.take_if(|voice| !voice.say(text)).is_some()
+    /// Calls a text out. Returns whether the voice command has ended.
+    pub fn call_out(&mut self, text: &str) -> bool {
+        self.voice.take_if(|voice| !voice.call_out(text)).is_some()
     }
 
     /// Whether the terminal distinguishes a held key's repeats from presses.
@@ -151,11 +151,11 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call, and shows this screen. Asks it again
-    /// if that is due, and if it has taken what was written.
+    /// Whether the terminal has answered since the last call, and shows this screen. Queries it
+    /// again if that is due, and if it has accepted the last frame.
     pub fn answers(&mut self, now: Duration) -> bool {
-        if now >= self.ask_at && matches!(self.writer.is_busy(), Ok(false)) {
-            self.ask(now);
+        if now >= self.query_at && matches!(self.writer.is_busy(), Ok(false)) {
+            self.query(now);
         }
         self.take_answer(now);
         let fits = self.terminal.size().is_ok_and(|size| size.width >= LEAST.0 && size.height >= LEAST.1);
@@ -170,10 +170,10 @@ impl Screen {
         self.pace.check_answer(now);
     }
 
-    /// Sends what was drawn, and asks behind it whether the terminal has taken it.
-    fn ask(&mut self, now: Duration) {
-        if self.pace.asks(now) {
-            self.ask_at = now + ASK_EVERY;
+    /// Sends the drawn frame, and behind it a query whether the terminal has accepted it.
+    fn query(&mut self, now: Duration) {
+        if self.pace.begins_query(now) {
+            self.query_at = now + QUERY_EVERY;
             // Writing to a buffer in memory cannot fail.
             let _ = io::Write::write_all(&mut self.terminal.backend_mut().terminal, answers::QUESTION);
             answers::note_question();
@@ -214,7 +214,7 @@ impl Screen {
                 Poll::Ready(Some(Ok(_))) => {}
                 Poll::Ready(Some(Err(_)) | None) => {
                     self.input_ended = true;
-                    break Some(Msg::Terminate(GONE));
+                    break Some(Msg::Terminate(TERMINAL_LOST));
                 }
             }
         };
@@ -249,7 +249,7 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     answers::begin()?;
-    // Some terminals have no alternate screen, and show what was there before.
+    // Some terminals have no alternate screen, and still show the earlier content.
     execute!(io::stdout(), EnterAlternateScreen, Clear(ClearType::All), EnableBracketedPaste)?;
     request_repeat_reports()?;
     let (writer, buffer) = TerminalWriter::new()?;
@@ -257,7 +257,7 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     // GNU Screen sets it.
     backend.erases = std::env::var_os("STY").is_none();
     backend.has_true_colour =
-        std::env::var("COLORTERM").is_ok_and(|says| ["truecolor", "24bit"].contains(&says.as_str()));
+        std::env::var("COLORTERM").is_ok_and(|colours| ["truecolor", "24bit"].contains(&colours.as_str()));
     Ok((Terminal::new(backend)?, writer))
 }
 
@@ -268,7 +268,7 @@ fn is_answered_by_another() -> bool {
     ["TMUX", "STY"].iter().any(is_set) && is_set(&"SSH_CONNECTION")
 }
 
-/// Asks the terminal to distinguish a held key's repeats from presses, if it supports that.
+/// Requests that the terminal distinguishes a held key's repeats from presses, if it supports that.
 fn request_repeat_reports() -> io::Result<()> {
     if supports_keyboard_enhancement().unwrap_or(false) {
         // Event types need escape codes; without the first flag Ctrl-X would stay a single byte.
@@ -333,8 +333,8 @@ fn restore_before_panic_message() {
     }));
 }
 
-// Writes frames to the terminal in a thread of its own, so that a blocked terminal (stopped output,
-// a hanging session) does not stop link, log and abort.
+// Writes frames to the terminal in a separate thread, so that a blocked terminal (stopped output, a
+// hanging session) does not stop link, log and abort.
 
 /// Whether a frame is being written. There is only one terminal.
 static WRITING: AtomicBool = AtomicBool::new(false);
@@ -367,7 +367,7 @@ impl Write for FrameBuffer {
 pub(super) struct TerminalWriter {
     page: FrameBuffer,
     frames: SyncSender<Vec<u8>>,
-    gone: Arc<AtomicBool>,
+    lost: Arc<AtomicBool>,
 }
 
 impl TerminalWriter {
@@ -377,11 +377,11 @@ impl TerminalWriter {
     /// The thread cannot be started.
     pub(super) fn new() -> io::Result<(Self, FrameBuffer)> {
         let (frames, waiting) = sync_channel(1);
-        let (page, gone) = (FrameBuffer::default(), Arc::new(AtomicBool::new(false)));
-        let failed = Arc::clone(&gone);
+        let (page, lost) = (FrameBuffer::default(), Arc::new(AtomicBool::new(false)));
+        let failed = Arc::clone(&lost);
         // The thread is never joined: it may hang with the terminal, and holds only a frame.
         in_a_thread("terminal", move || write_frames(&waiting, &failed))?;
-        Ok((Self { page: page.clone(), frames, gone }, page))
+        Ok((Self { page: page.clone(), frames, lost }, page))
     }
 
     /// Whether the previous frame is still being written.
@@ -389,7 +389,7 @@ impl TerminalWriter {
     /// # Errors
     /// The terminal is gone.
     pub(super) fn is_busy(&self) -> io::Result<bool> {
-        if self.gone.load(Ordering::Acquire) {
+        if self.lost.load(Ordering::Acquire) {
             return Err(io::Error::from(io::ErrorKind::BrokenPipe));
         }
         Ok(WRITING.load(Ordering::Acquire))
@@ -427,11 +427,11 @@ pub(super) fn wait_for_end() -> bool {
     false
 }
 
-fn write_frames(frames: &Receiver<Vec<u8>>, gone: &AtomicBool) {
+fn write_frames(frames: &Receiver<Vec<u8>>, lost: &AtomicBool) {
     let mut out = io::stdout();
     for frame in frames {
         let written = out.write_all(&frame).and_then(|()| out.flush());
-        gone.fetch_or(written.is_err(), Ordering::AcqRel);
+        lost.fetch_or(written.is_err(), Ordering::AcqRel);
         WRITING.store(false, Ordering::Release);
     }
 }

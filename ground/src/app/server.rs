@@ -1,5 +1,5 @@
-//! The station's side of its socket: sends history and news to attached screens, and receives their
-//! requests.
+//! The station's side of its socket: sends history and updates to attached screens, and receives
+//! their requests.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -28,10 +28,10 @@ const REQUESTS_MAX: usize = 64;
 /// How long a new connection may take to send its first message.
 const SPEAKS_WITHIN: Duration = Duration::from_secs(5);
 
-/// What a screen says.
-type Asked = FramedRead<OwnedReadHalf, LengthDelimitedCodec>;
+/// The messages of a screen.
+type ScreenMessages = FramedRead<OwnedReadHalf, LengthDelimitedCodec>;
 
-/// What a station receives over its socket.
+/// An event of the station's socket.
 #[derive(Debug)]
 pub enum ServerEvent {
     /// A screen has attached.
@@ -40,11 +40,11 @@ pub enum ServerEvent {
         seat: Seat,
         watch: bool,
     },
-    /// The screen with this number is gone.
+    /// The screen with this number has left.
     ScreenLeft(u32),
-    /// A screen asks for something.
+    /// A request of a screen.
     FromScreen(Seat, ToStation),
-    /// A command without a screen asks and waits for the answer.
+    /// A query of a command without a screen, which waits for the answer.
     Question(ToStation, oneshot::Sender<ToScreen>),
 }
 
@@ -64,10 +64,10 @@ pub struct Server {
     accepting: tokio::task::JoinHandle<()>,
 }
 
-/// What the tasks of all screens share.
+/// The state shared by the tasks of all screens.
 struct Shared {
     history: Mutex<History>,
-    news: broadcast::Sender<Bytes>,
+    updates: broadcast::Sender<Bytes>,
     next_screen: AtomicU32,
 }
 
@@ -76,24 +76,24 @@ impl Server {
     ///
     /// # Errors
     /// A station already runs there, or the path cannot be written.
-    pub async fn open(asked_for: Option<&Path>, hello: Hello, first_screen: u32) -> anyhow::Result<Self> {
-        let path = asked_for.map_or_else(socket::own_path, Path::to_owned);
+    pub async fn open(named: Option<&Path>, hello: Hello, first_screen: u32) -> anyhow::Result<Self> {
+        let path = named.map_or_else(socket::default_path, Path::to_owned);
         let serving = || format!("serving screens on {}", path.display());
         let listener = socket::listen(&path).await.with_context(serving)?;
         let mut paths = vec![path.clone()];
-        if asked_for.is_some() {
+        if named.is_some() {
             paths.push(socket::link_from_directory(&path).with_context(serving)?);
         }
-        let (news, _) = broadcast::channel(BEHIND_MAX);
-        let (ask, requests) = mpsc::channel(REQUESTS_MAX);
+        let (updates, _) = broadcast::channel(BEHIND_MAX);
+        let (events, requests) = mpsc::channel(REQUESTS_MAX);
         let history = Mutex::new(History { hello, ..History::default() });
-        let shared = Arc::new(Shared { history, news, next_screen: AtomicU32::new(first_screen) });
+        let shared = Arc::new(Shared { history, updates, next_screen: AtomicU32::new(first_screen) });
         let for_screens = Arc::clone(&shared);
         let accepting = tokio::spawn(async move {
             loop {
                 match listener.accept().await {
                     Ok((stream, _)) if socket::check_peer(&stream).is_ok() => {
-                        tokio::spawn(receive(stream, Arc::clone(&for_screens), ask.clone()));
+                        tokio::spawn(receive(stream, Arc::clone(&for_screens), events.clone()));
                     }
                     Ok(_) => {}
                     // Probably out of file descriptors; some may be free later.
@@ -104,7 +104,7 @@ impl Server {
         Ok(Self { paths, shared, requests, accepting })
     }
 
-    /// Sends a message to every screen, and keeps it for later ones.
+    /// Sends a message to every screen, and stores it for later ones.
     pub fn publish(&mut self, msg: &Msg, now: Duration) {
         let Some(bytes) = encode_to_screen(&ToScreen::Msg(msg.clone()), now).map(Bytes::from) else { return };
         let Ok(mut history) = self.shared.history.lock() else { return };
@@ -113,7 +113,7 @@ impl Server {
         }
         history.backlog.push(&bytes);
         // Fails only if no screen is attached.
-        let _ = self.shared.news.send(bytes);
+        let _ = self.shared.updates.send(bytes);
     }
 
     /// Greets later screens with this.
@@ -126,7 +126,7 @@ impl Server {
     /// The next event.
     pub async fn next(&mut self) -> ServerEvent {
         match self.requests.recv().await {
-            Some(news) => news,
+            Some(updates) => updates,
             None => std::future::pending().await,
         }
     }
@@ -151,16 +151,16 @@ pub(super) fn hello(model: &Model) -> Hello {
 impl Shared {
     /// The history, and a receiver for everything after it, with no gap and no overlap.
     fn snapshot(&self, screen: u32) -> (Vec<Bytes>, broadcast::Receiver<Bytes>) {
-        let Ok(history) = self.history.lock() else { return (Vec::new(), self.news.subscribe()) };
+        let Ok(history) = self.history.lock() else { return (Vec::new(), self.updates.subscribe()) };
         let hello = ToScreen::Hello(Box::new(Hello { screen, ..history.hello.clone() }));
         let hello = encode_to_screen(&hello, Duration::ZERO).map(Bytes::from);
         let past = hello.iter().chain(&history.checklist).cloned().chain(history.backlog.all()).collect();
-        (past, self.news.subscribe())
+        (past, self.updates.subscribe())
     }
 }
 
-/// Serves a new connection: a screen, or a single question.
-async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<ServerEvent>) {
+/// Serves a new connection: a screen, or a single query.
+async fn receive(stream: UnixStream, shared: Arc<Shared>, events: mpsc::Sender<ServerEvent>) {
     let (read, mut write) = stream.into_split();
     let mut read = messages(read);
     let Ok(Some(Ok(first))) = tokio::time::timeout(SPEAKS_WITHIN, read.next()).await else { return };
@@ -168,19 +168,19 @@ async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<Serv
         Ok(ToStation::Hello { watch, operator }) => {
             let screen = shared.next_screen.fetch_add(1, Ordering::Relaxed);
             let seat = Seat::new(screen, operator);
-            if ask.send(ServerEvent::ScreenJoined { seat: seat.clone(), watch }).await.is_ok() {
-                serve(read, write, &shared, (seat, watch), ask.clone()).await;
+            if events.send(ServerEvent::ScreenJoined { seat: seat.clone(), watch }).await.is_ok() {
+                serve(read, write, &shared, (seat, watch), events.clone()).await;
                 // Fails only if the station is ending.
-                let _ = ask.send(ServerEvent::ScreenLeft(screen)).await;
+                let _ = events.send(ServerEvent::ScreenLeft(screen)).await;
             }
         }
         Ok(question @ (ToStation::Status | ToStation::Stop { .. })) => {
             let (answer, answered) = oneshot::channel();
-            if ask.send(ServerEvent::Question(question, answer)).await.is_ok()
-                && let Ok(told) = answered.await
+            if events.send(ServerEvent::Question(question, answer)).await.is_ok()
+                && let Ok(answer) = answered.await
             {
-                // The asking process may be gone.
-                let _ = write.write_all(&encode_to_screen(&told, Duration::ZERO).unwrap_or_default()).await;
+                // The querying process may have ended.
+                let _ = write.write_all(&encode_to_screen(&answer, Duration::ZERO).unwrap_or_default()).await;
             }
         }
         Ok(_) => {}
@@ -193,36 +193,36 @@ async fn receive(stream: UnixStream, shared: Arc<Shared>, ask: mpsc::Sender<Serv
 }
 
 async fn serve(
-    read: Asked,
+    read: ScreenMessages,
     mut write: OwnedWriteHalf,
     shared: &Shared,
     (seat, watch): (Seat, bool),
-    ask: mpsc::Sender<ServerEvent>,
+    events: mpsc::Sender<ServerEvent>,
 ) {
     let (past, mut live) = shared.snapshot(seat.screen);
-    let mut listening = tokio::spawn(listen_to(read, seat, watch, ask));
+    let mut listening = tokio::spawn(listen_to(read, seat, watch, events));
     let live_now = encode_to_screen(&ToScreen::Live, Duration::ZERO).map(Bytes::from);
     for bytes in past.into_iter().chain(live_now) {
         if write.write_all(&bytes).await.is_err() {
-            return hear_out(write, listening).await;
+            return read_last_requests(write, listening).await;
         }
     }
     loop {
         tokio::select! {
-            // Too far behind or gone; the screen sees the end and attaches again.
-            news = live.recv() => match news {
+            // Too far behind or lost; the screen receives the end and attaches again.
+            updates = live.recv() => match updates {
                 Ok(bytes) if write.write_all(&bytes).await.is_ok() => {}
                 _ => break,
             },
             _ = &mut listening => return,
         }
     }
-    hear_out(write, listening).await;
+    read_last_requests(write, listening).await;
 }
 
 /// Reads the last requests of a screen that can no longer be written to; there may be an abort
 /// among them.
-async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<()>) {
+async fn read_last_requests(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<()>) {
     // Closes our side; the screen then closes its own.
     drop(write);
     if tokio::time::timeout(SPEAKS_WITHIN, &mut listening).await.is_err() {
@@ -231,13 +231,13 @@ async fn hear_out(write: OwnedWriteHalf, mut listening: tokio::task::JoinHandle<
 }
 
 /// Reads a screen's requests until it closes or sends something invalid.
-async fn listen_to(mut read: Asked, seat: Seat, watch: bool, ask: mpsc::Sender<ServerEvent>) {
+async fn listen_to(mut read: ScreenMessages, seat: Seat, watch: bool, events: mpsc::Sender<ServerEvent>) {
     while let Some(Ok(bytes)) = read.next().await {
         match decode_to_station(&bytes) {
             // Requests of a screen that only watches are ignored.
             Ok(_) if watch => {}
-            Ok(asked) => {
-                if ask.send(ServerEvent::FromScreen(seat.clone(), asked)).await.is_err() {
+            Ok(message) => {
+                if events.send(ServerEvent::FromScreen(seat.clone(), message)).await.is_err() {
                     return;
                 }
             }

@@ -28,12 +28,12 @@ use crate::model::{BookLine, ChecklistEntry, LogHealth, Model, Seat, Settings, r
 use crate::update::{Action, Msg, update};
 
 /// How often the end of the closed book is sent to the vehicle, because a frame may be lost.
-const TOLD_AT_THE_END: usize = 3;
+const BOOK_END_REPEATS: usize = 3;
 const TICK: Duration = Duration::from_millis(100);
 /// How often link rates are reported; they are means over ten seconds.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// What the run loop holds besides the model and the links.
+/// The state of the run loop besides the model and the links.
 pub(super) struct Station {
     pub(super) clock: Clock,
     pub(super) log_time: LogTime,
@@ -47,8 +47,8 @@ pub(super) struct Station {
     pub(super) server: Option<Server>,
     /// The attached screens.
     pub(super) screens: Vec<Attached>,
-    /// Whether the station's own screen answers.
-    pub(super) own: Answers,
+    /// Whether the local screen answers.
+    pub(super) local_screen: Answers,
     pub(super) alarm_command: Option<String>,
     /// Why the newest alarm command could not be started, if so.
     pub(super) alarm_failure: Option<Receiver<Option<std::io::Error>>>,
@@ -56,7 +56,7 @@ pub(super) struct Station {
     pub(super) not_saved: bool,
     /// The report that is being written: its path, or why there is none.
     pub(super) report: Option<Receiver<Result<String, String>>>,
-    /// Who did what; `None` without a log.
+    /// The record of every action with its operator; `None` without a log.
     pub(super) book: Option<StationBook>,
     /// The file of the checklist's signatures; `None` without a checklist.
     pub(super) signatures: Option<Arc<Mutex<SignatureFile>>>,
@@ -76,15 +76,14 @@ pub(super) struct Attached {
     answers: Answers,
 }
 
-/// A screen that has not answered for so many ticks does not count; together they are
-/// `UNATTENDED_MAX`.
+/// Ticks without an answer after which a screen does not count; together they are `UNATTENDED_MAX`.
 const SILENT_AFTER: u8 = 8;
 
 /// Whether a screen's terminal answers.
 #[derive(Debug, Default)]
 pub(super) struct Answers {
     ever: bool,
-    /// For how many ticks it has not. A station that stood still has counted none meanwhile.
+    /// Ticks without an answer. A station that stood still has counted none meanwhile.
     silence: u8,
 }
 
@@ -97,12 +96,12 @@ impl Answers {
         self.silence = self.silence.saturating_add(1);
     }
 
-    fn hear(&mut self) {
+    fn note_answer(&mut self) {
         *self = Self { ever: true, silence: 0 };
     }
 }
 
-/// What the loop does next.
+/// The next step of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Next {
     Go,
@@ -119,7 +118,7 @@ impl Station {
         let mut signals = Signals::listen()?;
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        self.tell_crew(model, wire);
+        self.report_crew(model, wire);
         loop {
             let redraw_at = self.output.redraw_at();
             let (demo, server) = (&mut self.demo, &mut self.server);
@@ -129,7 +128,7 @@ impl Station {
                 // that Ctrl-X is held. The link comes last, because it can be busy all the time.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
-                Some(news) = OptionFuture::from(server.as_mut().map(Server::next)) => self.hear(news, model),
+                Some(event) = OptionFuture::from(server.as_mut().map(Server::next)) => self.on_server_event(event, model),
                 msg = self.output.input() => vec![msg],
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 Some(failure) = OptionFuture::from(demo.as_mut().map(Demo::ended)) => {
@@ -139,7 +138,7 @@ impl Station {
                     let now = self.clock.now();
                     self.output.pass(model, now);
                     self.count_silence(now);
-                    self.tell_crew(model, wire);
+                    self.report_crew(model, wire);
                     self.take_outcomes(model, wire);
                     self.tick_msgs(model)
                 }
@@ -151,9 +150,9 @@ impl Station {
             let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
             for msg in woken.into_iter().chain(report).chain(msgs) {
                 let msg = match msg {
-                    Msg::Terminate("SIGHUP" | screen::GONE) if self.outlives_its_screen() => {
+                    Msg::Terminate("SIGHUP" | screen::TERMINAL_LOST) if self.outlives_its_screen() => {
                         self.lose_screen(Lines::closed(), model).await;
-                        Msg::ScreenGone
+                        Msg::ScreenLost
                     }
                     msg => msg,
                 };
@@ -165,15 +164,15 @@ impl Station {
                 next = self.step(model, wire, Msg::ScreenQuit);
             }
             let now = self.clock.now();
-            if let Err(gone) = self.output.show(model, now, now) {
+            if let Err(error) = self.output.show(model, now, now) {
                 if !self.outlives_its_screen() {
-                    return Err(gone);
+                    return Err(error);
                 }
                 self.lose_screen(Lines::closed(), model).await;
-                next = next.max(self.step(model, wire, Msg::ScreenGone));
+                next = next.max(self.step(model, wire, Msg::ScreenLost));
             }
-            self.tell_crew(model, wire);
-            self.keep_logs_short(model);
+            self.report_crew(model, wire);
+            self.rotate_log(model);
             if next == Next::Quit {
                 return Ok(());
             }
@@ -182,17 +181,17 @@ impl Station {
 
     fn count_silence(&mut self, now: Duration) {
         self.screens.iter_mut().for_each(|screen| screen.answers.tick());
-        self.own.tick();
+        self.local_screen.tick();
         if self.output.answers(now) {
-            self.own.hear();
+            self.local_screen.note_answer();
         }
     }
 
     /// Reports who can command, if that has changed.
-    fn tell_crew(&mut self, model: &mut Model, wire: &mut Wire) {
-        let own = self.output.screen.is_some().then_some((&model.settings.seat, &self.own));
+    fn report_crew(&mut self, model: &mut Model, wire: &mut Wire) {
+        let local_screen = self.output.screen.is_some().then_some((&model.settings.seat, &self.local_screen));
         let attached = self.screens.iter().filter(|screen| !screen.watch);
-        let all = own.into_iter().chain(attached.map(|screen| (&screen.seat, &screen.answers)));
+        let all = local_screen.into_iter().chain(attached.map(|screen| (&screen.seat, &screen.answers)));
         let (mut seats, mut silent) = (Vec::new(), Vec::new());
         for (seat, answers) in all {
             if answers.is_silent() {
@@ -212,7 +211,7 @@ impl Station {
         let now = self.clock.now();
         let due = msgs.iter().any(|msg| match msg {
             Msg::Tick => now >= self.report_at,
-            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::LinkSays(_) => true,
+            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::LinkWarning(_) => true,
             _ => false,
         });
         if due {
@@ -238,28 +237,31 @@ impl Station {
     }
 
     /// Handles an event from the socket.
-    fn hear(&mut self, news: ServerEvent, model: &Model) -> Vec<Msg> {
-        match news {
+    fn on_server_event(&mut self, event: ServerEvent, model: &Model) -> Vec<Msg> {
+        match event {
             ServerEvent::ScreenJoined { seat, watch } => {
                 self.screens.push(Attached { seat, watch, answers: Answers::default() });
             }
             ServerEvent::ScreenLeft(number) => self.screens.retain(|screen| screen.seat.screen != number),
             ServerEvent::FromScreen(by, ToStation::Request(request)) => {
-                return vec![Msg::Asked { request, by }];
+                return vec![Msg::Requested { request, by }];
             }
             ServerEvent::FromScreen(by, ToStation::Here) => {
-                self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.hear());
+                self.screens
+                    .iter_mut()
+                    .filter(|one| one.seat == by)
+                    .for_each(|one| one.answers.note_answer());
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
-                let told = stations::stopping(model, force, self.clock.now());
-                let stops = matches!(told, ToScreen::Stopping { stops: true, .. });
+                let reply = stations::stopping(model, force, self.clock.now());
+                let stops = matches!(reply, ToScreen::Stopping { stops: true, .. });
                 let ending = if stops { "ends" } else { "refused" };
-                self.record_operator("stop", &operator, format!("asked for by {operator}: {ending}"));
-                // The asking process may be gone; the station ends in any case.
-                let _ = answer.send(told);
+                self.record_operator("stop", &operator, format!("requested by {operator}: {ending}"));
+                // The querying process may have ended; the station ends in any case.
+                let _ = answer.send(reply);
                 if stops {
                     return vec![Msg::Terminate("ground stop")];
                 }
@@ -278,7 +280,7 @@ impl Station {
         self.enter(&BookLine { kind: kind.to_owned(), who: who.to_owned(), text: detail });
     }
 
-    fn tell_alarm(&mut self, words: &str) {
+    fn run_alarm_command(&mut self, words: &str) {
         let Some(command) = &self.alarm_command else { return };
         match programs::run_alarm_command(command, words) {
             Ok(failure) => self.alarm_failure = Some(failure),
@@ -293,7 +295,7 @@ impl Station {
         self.record(Record::Event(Event { level: EventLevel::Warning, name: "ground".to_owned(), message }));
     }
 
-    /// Takes the outcomes of what runs beside the loop.
+    /// Handles the outcomes of the jobs beside the loop.
     pub(super) fn take_outcomes(&mut self, model: &mut Model, wire: &mut Wire) {
         if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()?) {
             self.give_up_alarm_command(&error);
@@ -317,9 +319,9 @@ impl Station {
     fn report_not_written(&mut self, target: Target, error: &anyhow::Error, model: &mut Model) {
         let now = self.clock.now();
         if let Target::Signature(_) = target {
-            model.warn(now, format!("the checklist is not kept over a restart: {error:#}"));
+            model.warn(now, format!("the checklist is not stored for a restart: {error:#}"));
         } else if !std::mem::replace(&mut self.not_saved, true) {
-            model.warn(now, format!("a restart will not know this: {error:#}"));
+            model.warn(now, format!("not stored for a restart: {error:#}"));
         }
     }
 
@@ -337,7 +339,7 @@ impl Station {
         health.into_iter().chain(book).chain(written).chain([Msg::Tick]).collect()
     }
 
-    /// Takes one message into the model and does the resulting actions.
+    /// Applies one message to the model and executes the resulting actions.
     pub(super) fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
         let now = self.clock.now();
         let mut next = Next::Go;
@@ -356,30 +358,30 @@ impl Station {
                     }
                     self.record(record);
                 }
-                Action::KeepPlace(place) => {
+                Action::StorePlace(place) => {
                     let target = Target::Position(place.boot);
                     self.save(target, model, move |folder| files::write_place(folder, &place));
                 }
-                Action::KeepUnfinished(kept) => {
-                    let write = move |folder: &Path| files::write_unfinished(folder, &kept);
+                Action::StoreUnfinished(unfinished) => {
+                    let write = move |folder: &Path| files::write_unfinished(folder, &unfinished);
                     self.save(Target::Unfinished, model, write);
                 }
                 Action::Enter(line) => self.enter(&line),
-                Action::KeepChecklist(entry) => self.keep_checklist(model, &entry, now),
+                Action::StoreChecklist(entry) => self.store_checklist(model, &entry, now),
                 Action::RefuseSignature(why) => self.publish(&Msg::SignRefused(why), now),
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
                         recorder.sync_soon();
                     }
                 }
-                Action::Redraw | Action::NextTheme | Action::Bell | Action::Say(_) => {
+                Action::Redraw | Action::NextTheme | Action::Bell | Action::CallOut(_) => {
                     self.output.act(&action, model, now);
                 }
-                Action::Alarm(words) => self.tell_alarm(&words),
+                Action::Alarm(words) => self.run_alarm_command(&words),
                 Action::WriteReport => self.write_report(model, now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 Action::Request(request) => {
-                    self.publish(&Msg::Asked { request, by: model.settings.seat.clone() }, now);
+                    self.publish(&Msg::Requested { request, by: model.settings.seat.clone() }, now);
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),
                 Action::Quit => next = Next::Quit,
@@ -426,11 +428,11 @@ impl Station {
         }
     }
 
-    /// Tells every screen what is kept from before this run: the checklist, the last place, what is
-    /// unfinished.
-    pub(super) fn publish_kept(&mut self, model: &Model, now: Duration) {
-        if let Some(kept) = &model.kept {
-            self.publish(&Msg::Unfinished(Box::new(kept.clone())), now);
+    /// Sends every screen the state stored before this run: the checklist, the last position, the
+    /// unfinished state.
+    pub(super) fn publish_stored(&mut self, model: &Model, now: Duration) {
+        if let Some(unfinished) = &model.stored_unfinished {
+            self.publish(&Msg::Unfinished(Box::new(unfinished.clone())), now);
         }
         self.publish_checklist(model, now);
         if let Some(place) = model.place {
@@ -438,7 +440,7 @@ impl Station {
         }
     }
 
-    /// Opens the book of this log, if there is one. `after` says what came before it.
+    /// Opens the book of this log, if there is one. `after` names the log before it.
     pub(super) fn open_book(&mut self, model: &Model, after: &str) {
         if self.recorder.is_none() {
             return;
@@ -488,7 +490,7 @@ impl Station {
         self.book = None;
         self.step(model, wire, msg);
         let Some(head) = model.book.head else { return };
-        for _ in 0..TOLD_AT_THE_END {
+        for _ in 0..BOOK_END_REPEATS {
             wire.send(&MavMessage::TD_BOOK_HEAD(head.message(model.settings.vehicle)), boot_of(model));
         }
     }
@@ -506,15 +508,15 @@ impl Station {
         recorder.try_record(record, at_ns);
     }
 
-    /// Tells every screen.
+    /// Sends a message to every screen.
     fn publish(&mut self, msg: &Msg, now: Duration) {
         if let Some(server) = &mut self.server {
             server.publish(msg, now);
         }
     }
 
-    /// Keeps a change of the checklist, and shows it on every screen.
-    fn keep_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
+    /// Stores a change of the checklist, and shows it on every screen.
+    fn store_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
         if let Some(file) = self.signatures.clone() {
             let entry = entry.clone();
             self.signed += 1;
@@ -525,7 +527,7 @@ impl Station {
         self.publish_checklist(model, now);
     }
 
-    /// Tells every screen the checklist.
+    /// Sends every screen the checklist.
     fn publish_checklist(&mut self, model: &Model, now: Duration) {
         if let Some(list) = &model.checklist {
             self.publish(&Msg::Checklist(Box::new(list.clone())), now);
@@ -541,7 +543,7 @@ impl Station {
         for outcome in background.finish() {
             match outcome {
                 Outcome::NotWritten(_, error) => {
-                    model.warn(clock.now(), format!("the next run will not know this: {error:#}"));
+                    model.warn(clock.now(), format!("not stored for the next run: {error:#}"));
                 }
                 // Its files are empty.
                 Outcome::NextLog(Ok(Some(log))) => _ = log.discard(),

@@ -64,17 +64,17 @@ pub(super) fn stopping(model: &Model, force: bool, now: Duration) -> ToScreen {
     ToScreen::Stopping { stops: true, words: format!("log: {log}") }
 }
 
-/// Sends one question to the station on this socket.
-async fn ask(path: &Path, asked: &ToStation) -> io::Result<ToScreen> {
-    let asking = async {
+/// Sends one query to the station on this socket.
+async fn query(path: &Path, request: &ToStation) -> io::Result<ToScreen> {
+    let exchange = async {
         let (read, mut write) = socket::connect(path).await?.into_split();
-        write.write_all(&encode_to_station(asked)).await?;
+        write.write_all(&encode_to_station(request)).await?;
         let bytes = messages(read).next().await.ok_or(ErrorKind::UnexpectedEof)??;
-        let (told, _) =
+        let (answer, _) =
             decode_to_screen(&bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?;
-        Ok(told)
+        Ok(answer)
     };
-    tokio::time::timeout(ANSWERS_WITHIN, asking)
+    tokio::time::timeout(ANSWERS_WITHIN, exchange)
         .await
         .unwrap_or_else(|_elapsed| Err(io::Error::from(ErrorKind::TimedOut)))
 }
@@ -89,11 +89,11 @@ type Found = (PathBuf, Result<StationStatus, String>);
 pub(super) async fn stations() -> io::Result<Vec<Found>> {
     let mut found = Vec::new();
     for path in socket::sockets()? {
-        let status = match ask(&path, &ToStation::Status).await {
+        let status = match query(&path, &ToStation::Status).await {
             Ok(ToScreen::Status(status)) => Ok(status),
             Ok(_) => Err("unexpected answer".to_owned()),
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::NotFound) => {
-                // The station is gone. If its socket cannot be removed, it is skipped again next
+                // The station has ended. If its socket cannot be removed, it is skipped again next
                 // time.
                 let _ = std::fs::remove_file(&path);
                 continue;
@@ -141,8 +141,8 @@ fn listed(found: &[Found]) -> String {
         (path, Ok(status @ StationStatus { pid, link, kind, boot_number, log, screens, .. })) => {
             let boot = Some(*boot_number).filter(|boot| *boot > 0).map(words::boot);
             let boot = boot.map_or_else(String::new, |boot| format!(" boot {boot}"));
-            let heard = status.vehicle.as_ref().map(|ids| format!("{ids} {kind}{boot}"));
-            let (vehicle, state) = (heard.as_deref().unwrap_or("not heard"), state(status));
+            let vehicle = status.vehicle.as_ref().map(|ids| format!("{ids} {kind}{boot}"));
+            let (vehicle, state) = (vehicle.as_deref().unwrap_or("no vehicle"), state(status));
             let (log, screens) = (log.as_deref().unwrap_or("none"), screens.join("; "));
             let screens = if screens.is_empty() { "none" } else { &screens };
             format!(
@@ -154,7 +154,7 @@ fn listed(found: &[Found]) -> String {
     found.iter().map(one).collect()
 }
 
-/// What was opened, or why it could not be; if the address is in use, by which station.
+/// Adds to a failure to open an address the station that uses it.
 ///
 /// # Errors
 /// It was not opened.
@@ -198,8 +198,8 @@ pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
     let text = match &found[..] {
         _ if as_json => {
             let one = |(socket, status): &Found| {
-                let told = status.as_ref().map(|status| json!(status));
-                let mut one = told.unwrap_or_else(|error| json!({ "error": error }));
+                let answer = status.as_ref().map(|status| json!(status));
+                let mut one = answer.unwrap_or_else(|error| json!({ "error": error }));
                 one["socket"] = json!(socket.display().to_string());
                 one
             };
@@ -211,15 +211,15 @@ pub async fn list(as_json: bool) -> anyhow::Result<Exit> {
     print(text.as_bytes()).map(|()| Exit::Yes)
 }
 
-/// `ground stop`: asks the station to end and waits until it has.
+/// `ground stop`: requests that the station ends, and waits for its end.
 ///
 /// # Errors
 /// No station runs, or several run.
 pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow::Result<Exit> {
     let path = the_station(named).await?;
-    let asked = ToStation::Stop { force, operator };
-    let told = ask(&path, &asked).await.with_context(|| format!("asking {} to end", path.display()))?;
-    let ToScreen::Stopping { stops, words } = told else {
+    let request = ToStation::Stop { force, operator };
+    let answer = query(&path, &request).await.with_context(|| format!("stopping {}", path.display()))?;
+    let ToScreen::Stopping { stops, words } = answer else {
         anyhow::bail!("{} sent an unexpected answer", path.display());
     };
     if !stops {
@@ -233,5 +233,5 @@ pub async fn stop(named: Option<&Path>, force: bool, operator: String) -> anyhow
         }
         tokio::time::sleep(LOOK_AGAIN_AFTER).await;
     }
-    anyhow::bail!("{} was told to end but has not within {} s", path.display(), ENDS_WITHIN.as_secs())
+    anyhow::bail!("{} has not ended within {} s of the request", path.display(), ENDS_WITHIN.as_secs())
 }

@@ -1,10 +1,9 @@
-//! Writes what changed on the screen in few bytes, for a slow line.
-//!
-//! The backend of ratatui says both colours of a cell whenever one of them changes, 20 bytes of
-//! which half say nothing new, and goes from row to row, where panels beside each other have other
-//! colours. This one writes all cells of a style together, takes the shortest way of the cursor,
-//! and says nothing about the letters of a blank. In flight that is less than half the bytes. Each
-//! frame stands for itself, so that what another program writes between two is no more than a blot.
+//! Writes what changed on the screen in few bytes, for a slow line. The backend of ratatui writes
+//! both colours of a cell whenever one of them changes, 20 bytes of which half are redundant, and
+//! goes from row to row, where panels beside each other have other colours. This one writes all
+//! cells of a style together, moves the cursor the shortest way, and writes no letter colour for a
+//! blank. In flight that is less than half the bytes. Each frame is independent, so that output of
+//! another program between two frames leaves only a blot.
 
 use std::io;
 use std::io::Write;
@@ -29,8 +28,7 @@ pub struct DiffBackend<W: Write> {
     /// stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
-    /// Whether the terminal erases with the background that was said last, as all do but GNU
-    /// Screen.
+    /// Whether the terminal erases with the last background, as all do but GNU Screen.
     pub erases: bool,
 }
 
@@ -64,20 +62,20 @@ struct Style {
 }
 
 impl Style {
-    /// What has to be said after another style.
-    fn codes_after(&self, said: &Self) -> Vec<u8> {
+    /// The codes that change another style into this one.
+    fn codes_after(&self, written: &Self) -> Vec<u8> {
         let mut new = Vec::new();
         for (flag, set, unset) in MODIFIERS {
-            match (said.modifier.contains(flag), self.modifier.contains(flag)) {
+            match (written.modifier.contains(flag), self.modifier.contains(flag)) {
                 (false, true) => new.push(set),
                 (true, false) => new.push(unset),
                 _ => {}
             }
         }
-        if self.fore != said.fore {
+        if self.fore != written.fore {
             new.extend(codes(self.fore, 30));
         }
-        if self.back != said.back {
+        if self.back != written.back {
             new.extend(codes(self.back, 40));
         }
         new
@@ -201,16 +199,17 @@ impl<W: Write> Backend for DiffBackend<W> {
         self.rightmost = runs.iter().map(|run| run.from.1 + run.columns - 1).fold(self.rightmost, u16::max);
         let out = &mut self.terminal;
         queue!(out, BeginSynchronizedUpdate)?;
-        let mut said = Style { fore: Color::Reset, back: Color::Reset, modifier: Modifier::empty() };
+        let mut written = Style { fore: Color::Reset, back: Color::Reset, modifier: Modifier::empty() };
         let mut cursor = None;
         // The next style is the one that takes the fewest codes.
-        while let Some(next) = (0..styles.len()).min_by_key(|next| styles[*next].codes_after(&said).len()) {
+        while let Some(next) = (0..styles.len()).min_by_key(|next| styles[*next].codes_after(&written).len())
+        {
             let style = styles.remove(next);
-            let codes: Vec<String> = style.codes_after(&said).iter().map(u8::to_string).collect();
+            let codes: Vec<String> = style.codes_after(&written).iter().map(u8::to_string).collect();
             if !codes.is_empty() {
                 write!(out, "\x1b[{}m", codes.join(";"))?;
             }
-            said = style;
+            written = style;
             for run in runs.iter().filter(|run| run.style == style) {
                 out.write_all(way(cursor, run.from).as_bytes())?;
                 write_symbols(out, &run.symbols, self.erases)?;
@@ -224,7 +223,7 @@ impl<W: Write> Backend for DiffBackend<W> {
     }
 
     fn hide_cursor(&mut self) -> io::Result<()> {
-        // ratatui asks for it with every frame.
+        // ratatui calls this with every frame.
         if std::mem::replace(&mut self.cursor_is_hidden, true) { Ok(()) } else { self.terminal.hide_cursor() }
     }
 
@@ -285,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_new_is_said() {
+    fn only_changed_attributes_are_written() {
         let cell = |symbol: &str, style: ratatui::style::Style| {
             let mut cell = Cell::default();
             cell.set_symbol(symbol).set_style(style);

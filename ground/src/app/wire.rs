@@ -17,29 +17,29 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::LinkAddress;
 
 use super::clock::{Clock, LogTime};
-use crate::model::{GONE_AFTER, LinkReport};
+use crate::model::{BOOT_EXPIRES_AFTER, LinkReport};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
-/// A run loop that has not come round for so long stood still: stopped, swapped out, or asleep with
-/// its computer.
+/// Time after which the run loop counts as stalled: stopped, swapped out, or asleep with its
+/// computer.
 const STOOD_STILL: Duration = Duration::from_secs(1);
-/// What arrives for so long after it has waited.
+/// How long after a stall the arriving data have waited.
 const WAITED_FOR: Duration = Duration::from_millis(500);
-/// How many boots a link remembers.
+/// Number of boots stored for each link.
 const BOOTS_MAX: usize = 8;
 
 /// The open links to one vehicle.
 pub struct Wire {
     links: Links,
-    /// Where the boots of the vehicle are heard, for each link.
+    /// The origins of the vehicle's boots, for each link.
     boots: Vec<BootOrigins>,
     vehicle: Address,
     lockouts: Lockouts,
     sources: Sources,
     /// When the run loop last came round.
     awake_at: Duration,
-    /// Until then what arrives is old: it is recorded and not shown.
+    /// Until then arriving data are stale: they are recorded and not shown.
     old_until: Duration,
     /// Whether a failure to save timestamps was reported.
     save_failure_reported: bool,
@@ -47,44 +47,44 @@ pub struct Wire {
     clock: Clock,
     pub(super) recorder: Option<Recorder>,
     log_time: LogTime,
-    /// Who is sent what is heard; nothing is ever read from them.
+    /// Receivers of every frame; they are never read from.
     listeners: Vec<UdpSocket>,
     /// Bytes that left and are not reported yet.
     sent_bytes: usize,
 }
 
-/// From where each boot of the vehicle was last heard over a link, and when.
+/// The origin of each boot's last frame over a link, and its time.
 #[derive(Default)]
 struct BootOrigins(Vec<(u32, Origin, Duration)>);
 
 impl BootOrigins {
-    /// Notes from where a boot is heard.
+    /// Stores the origin of a boot.
     fn note(&mut self, boot: u32, from: Origin, now: Duration) {
-        self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < GONE_AFTER);
+        self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < BOOT_EXPIRES_AFTER);
         self.0.push((boot, from, now));
         self.0.drain(..self.0.len().saturating_sub(BOOTS_MAX));
     }
 
-    /// Where this boot is; `None` if nothing is known that tells.
+    /// The origin of this boot; `None` if unknown.
     ///
     /// # Errors
-    /// Only other boots are heard over this link.
+    /// Only other boots are received over this link.
     fn origin_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
         let source = self.0.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
-        let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < GONE_AFTER);
+        let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < BOOT_EXPIRES_AFTER);
         if source.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(source) }
     }
 }
 
-/// Only other vehicles are heard over a link.
+/// Only other vehicles are received over a link.
 struct OtherVehicles;
 
-/// What one pass takes from the links.
+/// The result of one pass over the links.
 #[derive(Default)]
 struct Taken {
     msgs: Vec<Msg>,
     bytes: usize,
-    believed: bool,
+    accepted: bool,
 }
 
 impl Wire {
@@ -119,7 +119,7 @@ impl Wire {
         })
     }
 
-    /// Sends what is heard on to these hosts and ports, too.
+    /// Forwards every received frame to these hosts and ports.
     ///
     /// # Errors
     /// A host is unknown.
@@ -144,15 +144,15 @@ impl Wire {
         self.links.each().map(|(address, _)| address)
     }
 
-    /// What the only link carries, bytes per second; `None` if no bound is known, and for several
+    /// Capacity of the only link, bytes per second; `None` if no bound is known, and for several
     /// links.
     pub fn capacity_bytes_s(&self) -> Option<u32> {
         let mut all = self.endpoints();
         all.next().filter(|_| all.next().is_none())?.capacity_bytes_s()
     }
 
-    /// The next data of any link, with the number of the link. What waits for a slow line is sent
-    /// meanwhile.
+    /// The next data of any link, with the number of the link. Frames waiting for a slow line are
+    /// sent meanwhile.
     pub async fn receive(&mut self) -> (usize, Received) {
         loop {
             let (clock, due_at) = (self.clock, self.links.hub().due_at());
@@ -163,14 +163,16 @@ impl Wire {
         }
     }
 
-    /// Notes that the run loop comes round. Returns what to say if it stood still.
+    /// Records a pass of the run loop. Returns the warning if it was stalled.
     pub(super) fn note_awake(&mut self) -> Option<Msg> {
         let now = self.clock.now();
-        let stood = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
-        (stood >= STOOD_STILL).then(|| {
+        let stalled = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
+        (stalled >= STOOD_STILL).then(|| {
             self.old_until = now + WAITED_FOR;
-            let stood_s = stood.as_secs();
-            Msg::LinkSays(format!("this station stood still for {stood_s} s: what waited is in the log only"))
+            let stood_s = stalled.as_secs();
+            Msg::LinkWarning(format!(
+                "this station stood still for {stood_s} s: what waited is in the log only"
+            ))
         })
     }
 
@@ -185,10 +187,10 @@ impl Wire {
                 self.take_one(number, received, &mut taken);
             }
         }
-        let Taken { mut msgs, bytes, believed } = taken;
+        let Taken { mut msgs, bytes, accepted } = taken;
         msgs.push(Msg::Received { bytes, framing: self.framing() });
         // Saved before the frames are used, so that nothing can be replayed after a crash.
-        if believed {
+        if accepted {
             msgs.splice(0..0, self.save_timestamps());
         }
         msgs
@@ -202,13 +204,13 @@ impl Wire {
         let msgs = &mut taken.msgs;
         let name = self.links.name(number).to_owned();
         let now = self.now();
-        for news in self.links.take(number, received, now) {
-            match news {
+        for event in self.links.take(number, received, now) {
+            match event {
                 LinkEvent::Frame(frame) => {
                     self.lockouts.accepted(&frame);
                     self.record(Direction::Rx, &name, &frame);
                     for listener in &self.listeners {
-                        // Nobody may listen there yet.
+                        // The receiver may not listen yet.
                         let _ = listener.send(frame.as_bytes());
                     }
                     if now.time < self.old_until {
@@ -216,7 +218,7 @@ impl Wire {
                     }
                     self.note_boot(number, &frame, from);
                     if self.links.count() > 1 {
-                        msgs.push(Msg::HeardOver(number));
+                        msgs.push(Msg::ReceivedOver(number));
                     }
                     if frame.source() == self.vehicle {
                         // On a link with one peer it is the same source after the line was opened
@@ -230,18 +232,20 @@ impl Wire {
                     self.record(Direction::Rx, &name, &frame);
                     self.note_boot(number, &frame, from);
                 }
-                LinkEvent::Accepted(_) => taken.believed = true,
-                LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkSays(self.named(&name, words))),
+                LinkEvent::Accepted(_) => taken.accepted = true,
+                LinkEvent::UnknownSenders(words) => msgs.push(Msg::LinkWarning(self.named(&name, words))),
                 // Counted and shown in the report of the link; a sender that is locked out is
                 // reported.
                 LinkEvent::Rejected(frame, why) => {
-                    msgs.extend(self.lockouts.refused(&frame, why, now.time, now.stamp).map(Msg::LinkSays));
+                    msgs.extend(
+                        self.lockouts.refused(&frame, why, now.time, now.stamp).map(Msg::LinkWarning),
+                    );
                 }
                 LinkEvent::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
                 LinkEvent::Down(why) if self.links.each().all(|(_, link)| link.trouble().is_some()) => {
                     msgs.push(Msg::LinkDown(why));
                 }
-                LinkEvent::Down(why) => msgs.push(Msg::LinkSays(format!("one link down: {why}"))),
+                LinkEvent::Down(why) => msgs.push(Msg::LinkWarning(format!("one link down: {why}"))),
             }
         }
     }
@@ -258,7 +262,7 @@ impl Wire {
         })
     }
 
-    /// Notes from where a boot of the vehicle is heard: commands for it go there.
+    /// Stores the origin of a boot of the vehicle: commands for it go there.
     fn note_boot(&mut self, number: usize, frame: &Frame, from: Option<Origin>) {
         if frame.source() == self.vehicle
             && frame.message_id() == FLIGHT_STATUS_ID
@@ -270,16 +274,16 @@ impl Wire {
     }
 
     /// Sends a message over every link and returns the message that counts the bytes. For a slow
-    /// line it may wait. On a link that listens, what is meant for the vehicle goes only to where
-    /// its shown `boot` was heard; a heartbeat, an abort, a hold and a disarm go to everybody
-    /// there. 0: the vehicle has reported no boot.
+    /// line it may wait. On a link that listens, a message for the vehicle goes only to the origin
+    /// of its shown `boot`; a heartbeat, an abort, a hold and a disarm go to every peer there. 0:
+    /// the vehicle has reported no boot.
     pub fn send(&mut self, message: &MavMessage, boot: u32) -> Msg {
         let frame = self.encoder.encode(message);
         let now = self.now();
         for number in 0..self.links.count() {
             let to =
                 if concerns_all(message) { Ok(None) } else { self.boots[number].origin_of(boot, now.time) };
-            // Only other vehicles are heard over this link.
+            // Only other vehicles are received over this link.
             let Ok(to) = to else { continue };
             let Self { links, recorder, log_time, sent_bytes, .. } = self;
             links.send(number, &frame, to, now, &mut |name, frame, count| {
@@ -316,9 +320,9 @@ impl Wire {
     /// Saves signing timestamps for the next run; reports a failure once.
     pub fn save_timestamps(&mut self) -> Option<Msg> {
         let failed = self.links.save_timestamps().err();
-        let was_said = std::mem::replace(&mut self.save_failure_reported, failed.is_some());
+        let was_reported = std::mem::replace(&mut self.save_failure_reported, failed.is_some());
         let what = "signing time stamps are not saved, so frames could be replayed later";
-        failed.filter(|_| !was_said).map(|why| Msg::LinkSays(format!("{what}: {why}")))
+        failed.filter(|_| !was_reported).map(|why| Msg::LinkWarning(format!("{what}: {why}")))
     }
 
     fn now(&self) -> Now {
@@ -340,7 +344,7 @@ fn record(recorder: Option<&Recorder>, log_time: &LogTime, direction: Direction,
     }
 }
 
-/// Whether everybody on the link is to get a message.
+/// Whether a message goes to every peer of the link.
 fn concerns_all(message: &MavMessage) -> bool {
     let MavMessage::COMMAND_LONG(sent) = message else { return matches!(message, MavMessage::HEARTBEAT(_)) };
     match sent.command {
@@ -365,27 +369,27 @@ fn report_of(address: &LinkAddress, link: &HubLink, now: Duration) -> LinkReport
 /// one.
 const SOURCES_MAX: usize = 64;
 
-/// From where the vehicle is heard: a number for each link and address.
+/// Numbers the sources of the vehicle's frames, by link and address.
 #[derive(Default)]
 struct Sources {
-    known: VecDeque<((usize, Option<Origin>), u16)>,
+    numbers: VecDeque<((usize, Option<Origin>), u16)>,
     next: u16,
-    told: u16,
+    reported: u16,
 }
 
 impl Sources {
-    /// Frames come from this source from now on. Returns what tells it, if the last ones came from
-    /// another source.
+    /// Frames come from this source from now on. Returns the message about it, if the last ones
+    /// came from another source.
     fn turn_to(&mut self, source: (usize, Option<Origin>)) -> Option<Msg> {
-        let known = self.known.iter().find(|(known, _)| *known == source).map(|(_, number)| *number);
-        let number = known.unwrap_or_else(|| {
+        let found = self.numbers.iter().find(|(known, _)| *known == source).map(|(_, number)| *number);
+        let number = found.unwrap_or_else(|| {
             // The link's number in the upper byte.
             self.next = (source.0 as u16) << 8 | (self.next.wrapping_add(1) & 0xff);
-            self.known.drain(..(self.known.len() + 1).saturating_sub(SOURCES_MAX));
-            self.known.push_back((source, self.next));
+            self.numbers.drain(..(self.numbers.len() + 1).saturating_sub(SOURCES_MAX));
+            self.numbers.push_back((source, self.next));
             self.next
         });
-        (std::mem::replace(&mut self.told, number) != number).then_some(Msg::HeardFrom(number))
+        (std::mem::replace(&mut self.reported, number) != number).then_some(Msg::ReceivedFrom(number))
     }
 }
 
@@ -405,7 +409,7 @@ mod tests {
         let path = folder.path().join("sent.mcap");
         let recorder = Recorder::create(&path, false, &LogHeader::default()).unwrap();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-        let (mut told_drops, mut told_bytes) = (0, 0);
+        let (mut reported_drops, mut reported_bytes) = (0, 0);
         runtime.block_on(async {
             let clock = Clock::start();
             let link = vec![LinkAddress::UdpOut("127.0.0.1:9".to_owned())];
@@ -414,7 +418,7 @@ mod tests {
             for _ in 0..FRAMES {
                 let sent = wire.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()), 0);
                 let Msg::Sent { bytes, drops } = sent else { panic!("{sent:?}") };
-                (told_drops, told_bytes) = (drops, told_bytes + bytes);
+                (reported_drops, reported_bytes) = (drops, reported_bytes + bytes);
             }
         });
         assert_eq!(recorder.dropped(), 0);
@@ -426,13 +430,13 @@ mod tests {
                 (recorded, bytes) = (recorded + 1, bytes + data.len());
             }
         }
-        assert!(told_drops > 0 && recorded > 0, "{told_drops} dropped, {recorded} recorded");
-        assert_eq!((recorded + told_drops, bytes), (FRAMES, told_bytes));
+        assert!(reported_drops > 0 && recorded > 0, "{reported_drops} dropped, {recorded} recorded");
+        assert_eq!((recorded + reported_drops, bytes), (FRAMES, reported_bytes));
     }
 
-    /// A phone's map gets what the station hears, and nothing that it sends comes in.
+    /// A phone's map receives the station's frames, and its own frames are not accepted.
     #[test]
-    fn a_listener_hears_the_vehicle_and_is_never_heard() {
+    fn a_listener_receives_the_vehicle_and_its_frames_are_ignored() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(async {
             let clock = Clock::start();
@@ -447,15 +451,15 @@ mod tests {
             for _ in 0..3 {
                 let frame = said.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
                 vehicle.send_to(frame.as_bytes(), &station).unwrap();
-                let mut heard = Vec::new();
-                while heard.is_empty() {
+                let mut frames = Vec::new();
+                while frames.is_empty() {
                     let received = wire.receive().await;
                     let msgs = wire.take(received).into_iter();
-                    heard.extend(
+                    frames.extend(
                         msgs.filter_map(|msg| if let Msg::Frame(frame) = msg { Some(frame) } else { None }),
                     );
                 }
-                assert_eq!(heard, std::slice::from_ref(&frame));
+                assert_eq!(frames, std::slice::from_ref(&frame));
                 let mut bytes = [0; 300];
                 let (count, from) = phone.recv_from(&mut bytes).unwrap();
                 assert_eq!(&bytes[..count], frame.as_bytes());

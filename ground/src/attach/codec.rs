@@ -32,13 +32,15 @@ pub enum CodecError {
     Bytes(&'static str),
 }
 
-/// Encodes a message to a screen. `None` for messages that stay in the station (its own keys, its
-/// own end) and for messages that are too long.
-pub fn encode_to_screen(told: &ToScreen, now: Duration) -> Option<Vec<u8>> {
-    // The station answers these by what it does.
-    let is_answered =
-        matches!(told, ToScreen::Msg(Msg::Asked { request: Request::Report | Request::Sign { .. }, .. }));
-    if is_answered { None } else { message(&(told, now)) }
+/// Encodes a message to a screen. `None` for messages that stay in the station (its local keys, its
+/// end) and for messages that are too long.
+pub fn encode_to_screen(to_screen: &ToScreen, now: Duration) -> Option<Vec<u8>> {
+    // The station answers these by its actions.
+    let is_answered = matches!(
+        to_screen,
+        ToScreen::Msg(Msg::Requested { request: Request::Report | Request::Sign { .. }, .. })
+    );
+    if is_answered { None } else { message(&(to_screen, now)) }
 }
 
 /// Decodes a message to a screen, and its time.
@@ -50,8 +52,8 @@ pub fn decode_to_screen(bytes: &[u8]) -> Result<(ToScreen, Duration), CodecError
 }
 
 /// Encodes a message to a station.
-pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
-    message(asked).unwrap_or_default()
+pub fn encode_to_station(request: &ToStation) -> Vec<u8> {
+    message(request).unwrap_or_default()
 }
 
 /// Decodes a message to a station.
@@ -59,8 +61,8 @@ pub fn encode_to_station(asked: &ToStation) -> Vec<u8> {
 /// # Errors
 /// The bytes are not what a screen of this version sends.
 pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
-    let mut asked = payload(bytes)?;
-    match &mut asked {
+    let mut request = payload(bytes)?;
+    match &mut request {
         ToStation::Hello { operator: text, .. } | ToStation::Stop { operator: text, .. } => {
             *text = printable(text, OPERATOR_MAX);
         }
@@ -68,7 +70,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         ToStation::Request(Request::Note(text)) => *text = printable(text, NOTE_MAX),
         ToStation::Status | ToStation::Request(_) | ToStation::Here => {}
     }
-    Ok(asked)
+    Ok(request)
 }
 
 /// The messages of a connection, each without its length. The connection ends with one that is too
@@ -128,8 +130,8 @@ mod tests {
         Seat, Settings, Signature, parse_checklist,
     };
 
-    fn back(told: &ToScreen, now: Duration) -> (ToScreen, Duration) {
-        let bytes = encode_to_screen(told, now).unwrap();
+    fn back(message: &ToScreen, now: Duration) -> (ToScreen, Duration) {
+        let bytes = encode_to_screen(message, now).unwrap();
         let (prefix, rest) = bytes.split_first_chunk().unwrap();
         assert_eq!(u32::from_le_bytes(*prefix) as usize, rest.len());
         decode_to_screen(rest).unwrap()
@@ -181,7 +183,10 @@ mod tests {
             Msg::Received { bytes: 7, framing: FramerCounters { crc_errors: 8, ..Default::default() } },
             Msg::Log(LogHealth { dropped: 1, failed: true, removed: false, space }),
             Msg::Crew { seats: vec![seat.clone()], silent: vec![Seat::default()] },
-            Msg::Asked { request: Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort)), by: seat },
+            Msg::Requested {
+                request: Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort)),
+                by: seat,
+            },
             Msg::Tick,
         ];
         let status = StationStatus { pid: 7, phase: "PAD_ARMED".to_owned(), ..StationStatus::default() };
@@ -196,26 +201,26 @@ mod tests {
 
     #[test]
     fn messages_to_a_screen_survive_the_round_trip() {
-        for told in messages() {
-            assert_eq!(back(&told, Duration::new(5, 6)), (told, Duration::new(5, 6)));
+        for message in messages() {
+            assert_eq!(back(&message, Duration::new(5, 6)), (message, Duration::new(5, 6)));
         }
     }
 
-    /// A screen must be able to tell its crew which program to update.
+    /// A screen must be able to name the program to update.
     #[test]
-    fn a_message_of_another_version_says_which() {
+    fn a_message_of_another_version_names_it() {
         let mut bytes = encode_to_station(&ToStation::Status);
         bytes[PREFIX_LEN] += 1;
         assert_eq!(decode_to_station(&bytes[PREFIX_LEN..]), Err(CodecError::Version(VERSION + 1)));
     }
 
     #[test]
-    fn own_keys_and_what_the_station_answers_by_what_it_does_are_not_sent() {
-        let asked = |request| Msg::Asked { request, by: Seat::default() };
+    fn local_keys_and_requests_answered_by_an_action_are_not_sent() {
+        let requested = |request| Msg::Requested { request, by: Seat::default() };
         for msg in [
             Msg::Keys(vec![Key::Enter]),
-            asked(Request::Report),
-            asked(Request::Sign { step: 1, void: false }),
+            requested(Request::Report),
+            requested(Request::Sign { step: 1, void: false }),
         ] {
             assert_eq!(encode_to_screen(&ToScreen::Msg(msg), Duration::ZERO), None);
         }
@@ -238,7 +243,7 @@ mod tests {
 
     #[test]
     fn messages_to_a_station_survive_the_round_trip() {
-        let asked = [
+        let requests = [
             ToStation::Hello { watch: true, operator: "anna on pts/3".to_owned() },
             ToStation::Status,
             ToStation::Stop { force: true, operator: "anna".to_owned() },
@@ -248,8 +253,8 @@ mod tests {
             ToStation::Key("Ctrl-X".to_owned()),
             ToStation::Here,
         ];
-        for asked in asked {
-            assert_eq!(decode_to_station(&encode_to_station(&asked)[PREFIX_LEN..]), Ok(asked));
+        for request in requests {
+            assert_eq!(decode_to_station(&encode_to_station(&request)[PREFIX_LEN..]), Ok(request));
         }
     }
 
@@ -264,8 +269,8 @@ mod tests {
             let aimed = [&VERSION.to_le_bytes()[..], &bytes].concat();
             let _ = decode_to_screen(&aimed);
             let _ = decode_to_station(&aimed);
-            for told in messages() {
-                let mut changed = encode_to_screen(&told, Duration::ZERO).unwrap().split_off(PREFIX_LEN);
+            for message in messages() {
+                let mut changed = encode_to_screen(&message, Duration::ZERO).unwrap().split_off(PREFIX_LEN);
                 let place = place.index(changed.len());
                 changed[place] = byte;
                 let _ = decode_to_screen(&changed);

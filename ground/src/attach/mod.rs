@@ -2,9 +2,9 @@
 //! socket.
 //!
 //! The station sends every message that it takes into its model to every screen, with its time. The
-//! screen takes the same messages into its own model and so shows the same. A screen sends back
-//! what the crew asks for; the station decides and acts. Killing a screen therefore loses nothing,
-//! and the station keeps repeating an abort.
+//! screen takes the same messages into its own model and so shows the same. A screen sends back the
+//! crew's requests; the station decides and acts. Killing a screen therefore loses nothing, and the
+//! station keeps repeating an abort.
 
 pub mod codec;
 pub mod socket;
@@ -60,7 +60,7 @@ pub struct StationStatus {
     pub demonstration: bool,
     /// LIVE, SIM or DEMO.
     pub kind: String,
-    /// The vehicle's MAVLink ids, as in `1/1`, if it was heard.
+    /// The vehicle's MAVLink ids, as in `1/1`, if it was received.
     pub vehicle: Option<String>,
     /// 0 if it is not known.
     pub boot_number: u32,
@@ -91,6 +91,6 @@ pub enum ToStation {
     Request(Request),
     /// A key was pressed; for the log.
     Key(String),
-    /// The screen's terminal answers. A screen that has not said so for a second does not count.
+    /// The screen's terminal answers. A screen without an answer for a second does not count.
     Here,
 }

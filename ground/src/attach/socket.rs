@@ -18,12 +18,12 @@ const ENDING: &str = "sock";
 pub fn directory() -> PathBuf {
     match std::env::var_os("XDG_RUNTIME_DIR").filter(|directory| !directory.is_empty()) {
         Some(directory) => PathBuf::from(directory).join("touchdown"),
-        None => PathBuf::from(format!("/tmp/touchdown-{}", own_user().unwrap_or(0))),
+        None => PathBuf::from(format!("/tmp/touchdown-{}", current_user().unwrap_or(0))),
     }
 }
 
 /// The socket path of this process in that directory.
-pub fn own_path() -> PathBuf {
+pub fn default_path() -> PathBuf {
     directory().join(format!("{}.{ENDING}", std::process::id()))
 }
 
@@ -47,7 +47,7 @@ pub fn sockets() -> io::Result<Vec<PathBuf>> {
 }
 
 /// The user id of this process; `None` if the system does not tell it.
-pub fn own_user() -> Option<u32> {
+pub fn current_user() -> Option<u32> {
     std::fs::metadata("/proc/self").ok().map(|process| process.uid())
 }
 
@@ -71,7 +71,7 @@ pub fn check_peer(stream: &UnixStream) -> io::Result<()> {
 
 /// Checks that something belongs to this user.
 fn check_user(other: u32, what: &str) -> io::Result<()> {
-    match own_user() {
+    match current_user() {
         Some(user) if user != other => Err(io::Error::new(
             io::ErrorKind::PermissionDenied,
             format!("{what} belongs to user {other}, not to user {user}"),
@@ -85,7 +85,7 @@ fn check_owner(directory: &Path) -> io::Result<()> {
     check_user(std::fs::metadata(directory)?.uid(), &directory.display().to_string())
 }
 
-/// Listens on a path and replaces a socket that nobody listens on any more.
+/// Listens on a path and replaces a socket without a listener.
 ///
 /// # Errors
 /// A station already runs there, or the path cannot be written.
@@ -115,7 +115,7 @@ pub async fn listen(path: &Path) -> io::Result<UnixListener> {
 /// # Errors
 /// The directory cannot be written.
 pub fn link_from_directory(path: &Path) -> io::Result<PathBuf> {
-    let link = own_path();
+    let link = default_path();
     make(&directory())?;
     check_owner(&directory())?;
     if link.symlink_metadata().is_ok() {

@@ -30,7 +30,7 @@ pub enum Act {
     Check,
     /// The same for a check without motion.
     CheckStill,
-    /// Open the dialog that says that every surface moved as it should.
+    /// Open the dialog that confirms that every surface moved as it should.
     Seen,
     /// Begin the radio range test.
     RangeTest,
@@ -66,13 +66,13 @@ pub struct Definition {
     pub words: &'static str,
 }
 
-/// What a key may do at once.
+/// What a key may do immediately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Effect {
     /// Changes only what is shown.
     Shows,
     /// Opens a dialog that commands the vehicle.
-    Asks,
+    Confirms,
     /// Commands the vehicle, and moves nothing.
     Commands,
     /// Does something else.
@@ -83,8 +83,8 @@ const fn shows(act: Act, name: &'static str, key: char, words: &'static str) -> 
     Definition { effect: Effect::Shows, act, name, key: Key::Char(key), words }
 }
 
-const fn asks(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Asks, act, name, key: Key::Char(key), words }
+const fn confirms(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect: Effect::Confirms, act, name, key: Key::Char(key), words }
 }
 
 const fn commands(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
@@ -97,20 +97,25 @@ const fn acts(act: Act, name: &'static str, key: char, words: &'static str) -> D
 
 /// Every action; the most important first.
 pub const DEFINITIONS: [Definition; 35] = [
-    asks(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
-    asks(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
-    asks(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
-    asks(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
+    confirms(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
+    confirms(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
+    confirms(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
+    confirms(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
     commands(Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
-    asks(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
-    asks(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
-    asks(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
-    asks(Act::Seen, "moved-right", 'Y', "I saw every surface move as the page x says: then SEEN and Enter"),
+    confirms(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
+    confirms(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
+    confirms(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
+    confirms(
+        Act::Seen,
+        "moved-right",
+        'Y',
+        "I saw every surface move as the page x says: then SEEN and Enter",
+    ),
     commands(Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
     acts(Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
     shows(Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
-    asks(Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
-    asks(Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
+    confirms(Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
+    confirms(Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
     shows(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
     shows(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
     shows(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
@@ -159,7 +164,7 @@ impl Act {
             Self::Start => acts && why_not_start(model, now).is_none(),
             Self::Disarm => acts && model.every_vehicle(now).any(|v| v.is_armed() && !v.in_flight()),
             Self::HoldCountdown => commands && model.every_vehicle(now).any(Vehicle::counts_down),
-            Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.own_number()),
+            Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.operator_number()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
             Self::Note => commands,
             Self::RangeTest => commands && why_not_check(model, now).is_none(),
@@ -201,16 +206,16 @@ impl Act {
 
     /// Whether it commands the vehicle, or opens a dialog that does.
     pub fn opens_confirmation(self) -> bool {
-        matches!(self.effect(), Effect::Asks | Effect::Commands)
+        matches!(self.effect(), Effect::Confirms | Effect::Commands)
     }
 
-    /// Whether it changes only what is shown, or opens a dialog: it works however fast its key
-    /// arrives.
-    pub fn only_shows_or_asks(self, model: &Model) -> bool {
+    /// Whether it changes only the display, or opens a dialog: then its key works at any typing
+    /// speed.
+    pub fn is_harmless(self, model: &Model) -> bool {
         if self == Self::Quit {
             model.is_at_risk()
         } else {
-            matches!(self.effect(), Effect::Shows | Effect::Asks)
+            matches!(self.effect(), Effect::Shows | Effect::Confirms)
         }
     }
 }
@@ -242,8 +247,8 @@ impl Act {
         self.definition().map_or_else(String::new, |definition| definition.key.name())
     }
 
-    /// The action that this small letter would have opened as a capital letter.
-    pub fn meant_as_capital(letter: char) -> Option<Self> {
+    /// The action of the capital letter, if it opens a confirmation.
+    pub fn of_small_letter(letter: char) -> Option<Self> {
         Self::exactly(Key::Char(letter.to_ascii_uppercase())).filter(|act| act.opens_confirmation())
     }
 }
@@ -258,8 +263,8 @@ pub const ABORT_WORDS: &str = "abort, anywhere: Enter within 2 s, or Ctrl-X twic
 pub enum PaletteAction {
     /// The same as its key.
     Act(Act),
-    /// Only says which keys abort.
-    TellAbort,
+    /// Only explains which keys abort.
+    ExplainAbort,
     /// Shows and commands this boot, of several vehicles under one id.
     Choose(u32),
     Plot(&'static Quantity),
@@ -279,13 +284,13 @@ pub fn palette_entries(model: &Model, typed: &str, now: Duration) -> Vec<Palette
     let fits =
         |entry: &PaletteEntry| typed.split_whitespace().all(|word| entry.words.to_lowercase().contains(word));
     let entry = |words: String, key: String, action| PaletteEntry { words, key, action };
-    let abort = entry(ABORT_WORDS.to_owned(), "Ctrl-X".to_owned(), PaletteAction::TellAbort);
+    let abort = entry(ABORT_WORDS.to_owned(), "Ctrl-X".to_owned(), PaletteAction::ExplainAbort);
     let acts = DEFINITIONS.iter().map(move |Definition { act, key, words, .. }| {
         entry((*words).to_owned(), key.name(), PaletteAction::Act(*act))
     });
     let others = model.other_boots(now);
-    let own = model.vehicle.boot.number().filter(|_| !others.is_empty());
-    let choices = own.into_iter().chain(others).map(move |boot| {
+    let shown = model.vehicle.boot.number().filter(|_| !others.is_empty());
+    let choices = shown.into_iter().chain(others).map(move |boot| {
         let number = words::boot(boot);
         let words = format!("choose boot {number}: show and command this one of several vehicles");
         entry(words, String::new(), PaletteAction::Choose(boot))
@@ -328,12 +333,12 @@ mod tests {
     }
 
     #[test]
-    fn shift_counts_unless_the_capital_letter_has_its_own_action() {
+    fn shift_is_ignored_unless_the_capital_letter_has_an_action() {
         assert_eq!(Act::of_key(Key::Char('F')), Some(Act::Show(Page::Find)));
         assert_eq!(Act::of_key(Key::Char('T')), Some(Act::Tap));
         assert_eq!(Act::of_key(Key::Char('j')), None);
-        assert_eq!(Act::meant_as_capital('d'), Some(Act::Disarm));
-        assert_eq!(Act::meant_as_capital('h'), Some(Act::HoldCountdown));
-        assert_eq!(Act::meant_as_capital('r'), None, "it opens no ladder");
+        assert_eq!(Act::of_small_letter('d'), Some(Act::Disarm));
+        assert_eq!(Act::of_small_letter('h'), Some(Act::HoldCountdown));
+        assert_eq!(Act::of_small_letter('r'), None, "it opens no ladder");
     }
 }

@@ -1,5 +1,5 @@
-//! Alarms: a condition raises them, and the bell rings until a person has acknowledged them. And
-//! what is called out.
+//! Alarms: a condition raises them, and the bell rings until a person acknowledges them. Also:
+//! callouts.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::CommandKind;
 
-/// An alarm that nobody has acknowledged rings again after this long.
+/// Interval at which an unacknowledged alarm rings again.
 pub const RING_EVERY: Duration = Duration::from_secs(4);
 
 /// What an alarm is about. There is at most one alarm of each kind.
@@ -18,15 +18,15 @@ pub enum AlarmKind {
     LinkLost,
     /// A screen that commands nothing was given a command.
     NothingSent,
-    /// The vehicle does not hear this station.
+    /// The vehicle does not receive this station.
     UplinkLost,
-    /// Frames are refused for their signature, and the vehicle is not heard.
+    /// Frames are refused for their signature, and no other data arrive from the vehicle.
     Signatures,
     /// The transport does not work.
     LinkDown,
-    /// An attached screen gets nothing any more. The station itself does not know this alarm.
+    /// An attached screen receives no more data. The station itself never raises this alarm.
     StationSilent,
-    /// Two vehicles are heard under the vehicle's id.
+    /// Two vehicles send under the vehicle's id.
     TwoVehicles,
     /// Another station uses our id.
     SameId,
@@ -39,9 +39,9 @@ pub enum AlarmKind {
     /// The command was sent repeatedly and not answered.
     Unanswered(CommandKind),
     Refused(CommandKind),
-    /// The vehicle has latched an abort, or inhibited its landing motor for good.
+    /// The vehicle has latched an abort, or inhibited its landing motor permanently.
     Aborted,
-    /// The landing motor was fired and did not light.
+    /// The landing motor was fired and did not ignite.
     NoLight,
     /// The upright stabiliser flies instead of the landing controller.
     Degraded,
@@ -49,13 +49,13 @@ pub enum AlarmKind {
     DeadlineMissed,
     /// Under thrust, the current plan ends outside a limit.
     PlanOutside,
-    /// The flight ended in another way than with a landing.
+    /// The flight did not end with a landing.
     NotLanded,
     /// The vehicle has rebooted.
     Rebooted,
     /// Recording has failed, or records are lost.
     Log,
-    /// The motor may still light.
+    /// The motor may still ignite.
     LiveMotor,
     Held,
     /// The vehicle's battery is low.
@@ -68,9 +68,9 @@ pub enum AlarmKind {
     CheckFailed,
     /// It is armed, and an arming check fails.
     Unfit,
-    /// The countdown has reached zero while the vehicle was not heard.
+    /// The countdown has reached zero while no telemetry arrived.
     MayBeFlying,
-    /// An earlier run of the station was asked for an abort that was not confirmed.
+    /// An abort requested in an earlier run of the station was not confirmed.
     AbortBefore,
 }
 
@@ -106,12 +106,11 @@ impl Alarm {
     }
 }
 
-/// The alarms that hold or that nobody has acknowledged yet, oldest first.
+/// The active and the unacknowledged alarms, oldest first.
 #[derive(Debug, Default)]
 pub struct Alarms {
     list: Vec<Alarm>,
-    /// Whether what arrives is still the past: nothing rings until a screen has received its
-    /// history.
+    /// Whether the received messages are still history: no bell rings until a screen has all of it.
     pub(crate) in_history: bool,
     rung_at: Option<Duration>,
 }
@@ -132,8 +131,8 @@ impl Alarms {
         &self.list
     }
 
-    /// The most urgent alarm: first what nobody has acknowledged (past ones last), of that what
-    /// holds, of that by its kind, of that the newest.
+    /// The foremost alarm: unacknowledged before acknowledged (past ones last), then active before
+    /// ended, then by urgency, then the newest.
     pub fn foremost(&self) -> Option<&Alarm> {
         self.list.iter().max_by_key(|alarm| {
             let unseen = if alarm.acknowledged { 0 } else { 2 - u8::from(alarm.past) };
@@ -141,12 +140,12 @@ impl Alarms {
         })
     }
 
-    /// Whether there is an alarm of this kind that nobody has acknowledged.
+    /// Whether an unacknowledged alarm of this kind exists.
     pub fn is_unseen(&self, kind: AlarmKind) -> bool {
         self.list.iter().any(|alarm| alarm.what.kind == kind && !alarm.acknowledged)
     }
 
-    /// How many alarms nobody has acknowledged.
+    /// Number of unacknowledged alarms.
     pub fn unacknowledged(&self) -> usize {
         self.list.iter().filter(|alarm| !alarm.acknowledged).count()
     }
@@ -162,13 +161,13 @@ impl Alarms {
         let mut raised = Vec::new();
         for what in conditions {
             match self.list.iter_mut().find(|alarm| alarm.what.kind == what.kind) {
-                Some(known) if known.is_active() => known.what.text = what.text,
-                known => {
+                Some(present) if present.is_active() => present.what.text = what.text,
+                present => {
                     let alarm =
                         Alarm { what, raised_at: now, ended_at: None, acknowledged: false, past: false };
                     raised.push(alarm.clone());
-                    match known {
-                        Some(known) => *known = alarm,
+                    match present {
+                        Some(present) => *present = alarm,
                         None => self.list.push(alarm),
                     }
                 }
@@ -215,8 +214,7 @@ impl Alarms {
     }
 }
 
-// What has been called out to the crew so far, how much is called out, and the bells that are still
-// to ring.
+// Callouts: the last ones made, the amount that the crew wants, and the bells still to ring.
 
 /// How much is called out.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Deserialize, ValueEnum)]
@@ -233,7 +231,7 @@ pub enum Amount {
     All,
 }
 
-/// How the crew wants to be talked to.
+/// The crew's settings for callouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Talk {
     pub amount: Amount,
@@ -255,7 +253,7 @@ pub struct Called {
     pub(crate) phase: Option<TdPhase>,
     pub(crate) height_m: Option<f64>,
     pub(crate) height_at: Option<Duration>,
-    /// What each row of the other callouts said last.
+    /// The last callout of each other row.
     pub(crate) rows: [Option<String>; 5],
     pub(crate) bells_left: u8,
 }
@@ -304,7 +302,7 @@ mod tests {
         assert_eq!(
             alarms.watch(S(20), lost()).len(),
             1,
-            "nobody has seen the first, and yet it is a new one"
+            "the first is unacknowledged, and yet it is a new one"
         );
         assert_eq!(alarms.list()[0].raised_at, S(20));
         let latched = || vec![condition(AlarmKind::Aborted, 1)];

@@ -1,10 +1,7 @@
-//! Which power-ups of which vehicles are heard under the id, and which one of them the screen
-//! shows.
-//!
-//! A *boot* is one vehicle from one power-up on. `TD_FLIGHT_STATUS` tells which one: by the
-//! vehicle's unique id, the number of the boot and the vehicle's clock. A heartbeat and our own
-//! messages have the number. What else is heard belongs to the boot whose clock, or whose sequence
-//! numbers, it fits.
+//! Tracks the boots received under a system id and selects the one to display. A *boot* is one
+//! vehicle from one power-up on. `TD_FLIGHT_STATUS` identifies it by the vehicle's unique id, the
+//! boot number and the vehicle's clock. Heartbeats and the messages of this dialect carry the boot
+//! number. Any other message is assigned to the boot whose clock or sequence numbers it fits.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -22,15 +19,15 @@ const OVERLAP_MS: i64 = 500;
 /// Over different links one clock arrives with different delays, up to this, ms; beyond it there
 /// are two clocks.
 const LINKS_APART_MS: i64 = 2_000;
-/// Of several vehicles under one id, one that is silent for this long is gone.
-pub const GONE_AFTER: Duration = Duration::from_secs(10);
-/// A vehicle that was shown, and whose next boot is heard from the same source, was reset if it is
-/// silent for this long: twenty reports on a network, and more than one on the slowest line.
+/// Silence after which one of several vehicles under an id is removed.
+pub const BOOT_EXPIRES_AFTER: Duration = Duration::from_secs(10);
+/// Silence after which the next boot from the same source is a reset of the shown vehicle: twenty
+/// reports on a network, and more than one on the slowest line.
 const RESET_AFTER: Duration = Duration::from_secs(2);
-/// How many boots are remembered: the shown one, and a few that stand beside it or came before it.
+/// Number of tracked boots: the shown one, and a few that run beside it or preceded it.
 const BOOTS_MAX: usize = 4;
-/// How many reports in [`STEADY_WITHIN`] show that a boot goes on: a single frame that anybody may
-/// have sent does not.
+/// Number of reports within [`STEADY_WITHIN`] that show a boot to be running; a single frame may be
+/// forged.
 const STEADY_REPORTS: usize = 3;
 const STEADY_WITHIN: Duration = Duration::from_secs(3);
 /// How many sources of one boot are distinguished.
@@ -38,12 +35,13 @@ const SOURCES_MAX: usize = 4;
 /// Sequence number and clock of one sender rise together. Reports this near to each other, ms, have
 /// fewer than 128 frames between them.
 const NEAR_MS: i64 = 500;
-/// A source that was heard so recently is where a boot reports.
+/// Maximum age of the last report from a source that a boot still uses.
 const ALIVE_WITHIN: Duration = Duration::from_secs(2);
-/// How often they contradict each other within [`GONE_AFTER`] until they are those of two vehicles.
+/// Number of contradictions of clock and sequence number within [`BOOT_EXPIRES_AFTER`] that prove
+/// two vehicles.
 const CONTRADICTIONS: usize = 3;
 
-/// What a flight status says of its sender.
+/// Identification of the sender in a flight status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatusReport {
     /// The vehicle's unique id; 0: not reported.
@@ -72,11 +70,11 @@ struct Source {
     reports: u32,
     clock_ms: u32,
     sequence: u8,
-    heard_at: Duration,
+    received_at: Duration,
 }
 
 impl Source {
-    /// How much later than its last report another one was said, ms.
+    /// Clock difference of another report to its last one, ms.
     fn clock_by_ms(&self, report: &StatusReport) -> i64 {
         i64::from(report.clock_ms) - i64::from(self.clock_ms)
     }
@@ -94,14 +92,14 @@ const fn link_of(source: u16) -> u16 {
 }
 
 #[derive(Debug, Clone, Default)]
-struct HeardBoot {
+struct TrackedBoot {
     id: BootId,
     uid: u16,
     number: u32,
     sources: Vec<Source>,
     /// The latest time on its clock, ms.
     clock_ms: u32,
-    heard_at: Duration,
+    received_at: Duration,
     /// When its last reports came.
     reports_at: VecDeque<Duration>,
     /// When its clock and its sequence numbers last contradicted each other.
@@ -118,19 +116,19 @@ fn is_within(at: Duration, limit: Duration, now: Duration) -> bool {
     now.saturating_sub(at) < limit
 }
 
-impl HeardBoot {
+impl TrackedBoot {
     /// Whether this is its number, as far as a heartbeat has room for it.
     fn is_number(&self, number: u32) -> bool {
         (self.number ^ number) & LARGEST_BOOT_NUMBER == 0
     }
 
-    fn is_heard(&self, now: Duration) -> bool {
-        is_within(self.heard_at, GONE_AFTER, now)
+    fn is_received(&self, now: Duration) -> bool {
+        is_within(self.received_at, BOOT_EXPIRES_AFTER, now)
     }
 
-    /// How far a time on a clock is from where this boot's clock should be by now, ms.
+    /// Difference between a clock reading and this boot's extrapolated clock, ms.
     fn away_ms(&self, clock_ms: u32, now: Duration) -> i64 {
-        i64::from(clock_ms) - i64::from(self.clock_ms) - ms(now.saturating_sub(self.heard_at))
+        i64::from(clock_ms) - i64::from(self.clock_ms) - ms(now.saturating_sub(self.received_at))
     }
 
     /// Whether a report may be one of this boot.
@@ -141,8 +139,8 @@ impl HeardBoot {
             && self.away_ms(report.clock_ms, now) <= REORDERED_MS
     }
 
-    fn hear(&mut self, report: &StatusReport, now: Duration) {
-        self.heard_at = now;
+    fn update(&mut self, report: &StatusReport, now: Duration) {
+        self.received_at = now;
         self.clock_ms = self.clock_ms.max(report.clock_ms);
         self.reports_at.push_back(now);
         self.reports_at.drain(..self.reports_at.len().saturating_sub(STEADY_REPORTS));
@@ -151,13 +149,13 @@ impl HeardBoot {
         let Some(source) = known else {
             self.sources.drain(..(self.sources.len() + 1).saturating_sub(SOURCES_MAX));
             let StatusReport { source: number, clock_ms, sequence, .. } = *report;
-            self.sources.push(Source { number, began_ms, reports: 1, clock_ms, sequence, heard_at: now });
+            self.sources.push(Source { number, began_ms, reports: 1, clock_ms, sequence, received_at: now });
             return;
         };
         let contradicts = source.clock_by_ms(report).abs() <= NEAR_MS && !source.is_in_order(report);
         source.began_ms = source.began_ms.min(began_ms);
         source.reports = source.reports.saturating_add(1);
-        (source.clock_ms, source.sequence, source.heard_at) = (report.clock_ms, report.sequence, now);
+        (source.clock_ms, source.sequence, source.received_at) = (report.clock_ms, report.sequence, now);
         if contradicts {
             self.contradict(now);
         }
@@ -169,16 +167,16 @@ impl HeardBoot {
         self.contradicted_at.drain(..self.contradicted_at.len().saturating_sub(CONTRADICTIONS));
     }
 
-    /// Whether a report comes from another address of the link over which this boot reports, and
-    /// does not keep step with it: what another way brings of the same vehicle does.
+    /// Whether a report comes from another address of the link over which this boot reports, and is
+    /// out of step with it. Copies of the same vehicle's frames over another link stay in step.
     fn is_out_of_step(&self, report: &StatusReport, now: Duration) -> bool {
-        let recent = self.sources.iter().filter(|source| is_within(source.heard_at, ALIVE_WITHIN, now));
-        // The newest one: a vehicle that gets another address goes on from there.
-        let Some(usual) = recent.max_by_key(|source| source.heard_at) else { return false };
-        let since_ms = ms(now.saturating_sub(usual.heard_at));
+        let recent = self.sources.iter().filter(|source| is_within(source.received_at, ALIVE_WITHIN, now));
+        // The newest one: a vehicle that gets another address continues from there.
+        let Some(usual) = recent.max_by_key(|source| source.received_at) else { return false };
+        let since_ms = ms(now.saturating_sub(usual.received_at));
         let is_on_time = (usual.clock_by_ms(report) - since_ms).abs() <= NEAR_MS;
-        let keeps_step = is_on_time && (since_ms > NEAR_MS || usual.is_in_order(report));
-        usual.number != report.source && link_of(usual.number) == link_of(report.source) && !keeps_step
+        let is_in_step = is_on_time && (since_ms > NEAR_MS || usual.is_in_order(report));
+        usual.number != report.source && link_of(usual.number) == link_of(report.source) && !is_in_step
     }
 
     /// How many frames after its last report a sequence number comes.
@@ -213,7 +211,7 @@ impl HeardBoot {
     /// Whether two vehicles speak with this unique id and this boot: a copied memory card.
     fn is_of_two(&self, now: Duration) -> bool {
         let contradicts = self.contradicted_at.len() == CONTRADICTIONS
-            && self.contradicted_at.iter().all(|at| is_within(*at, GONE_AFTER, now));
+            && self.contradicted_at.iter().all(|at| is_within(*at, BOOT_EXPIRES_AFTER, now));
         let clocks = || self.sources.iter().filter(|source| source.reports > 5).map(|source| source.began_ms);
         let apart_ms = clocks().max().zip(clocks().min()).map_or(0, |(last, first)| last - first);
         contradicts || apart_ms > LINKS_APART_MS
@@ -223,16 +221,16 @@ impl HeardBoot {
 /// Another vehicle beside the shown one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beside {
-    /// This boot; its number, 0 if it tells none.
+    /// This boot; its number, 0 if it reports none.
     Boot(BootId, u32),
     /// One that has the unique id and the boot of the shown one.
     Twin,
 }
 
-/// The boots that are heard.
+/// The tracked boots.
 #[derive(Debug, Clone, Default)]
 pub struct Boots {
-    list: Vec<HeardBoot>,
+    list: Vec<TrackedBoot>,
     shown: Option<BootId>,
     /// The boot that the crew has chosen by name.
     chosen: Option<BootId>,
@@ -240,11 +238,11 @@ pub struct Boots {
 }
 
 impl Boots {
-    fn of(&self, id: BootId) -> Option<&HeardBoot> {
+    fn of(&self, id: BootId) -> Option<&TrackedBoot> {
         self.list.iter().find(|boot| boot.id == id)
     }
 
-    fn shown_boot(&self) -> Option<&HeardBoot> {
+    fn shown_boot(&self) -> Option<&TrackedBoot> {
         self.of(self.shown?)
     }
 
@@ -253,7 +251,7 @@ impl Boots {
     }
 
     /// The boot that fits, if it is the only one.
-    fn only(&self, fits: impl Fn(&HeardBoot) -> bool) -> Option<BootId> {
+    fn only(&self, fits: impl Fn(&TrackedBoot) -> bool) -> Option<BootId> {
         let mut fitting = self.list.iter().filter(|boot| fits(boot)).map(|boot| boot.id);
         fitting.next().filter(|_| fitting.next().is_none())
     }
@@ -267,30 +265,30 @@ impl Boots {
     /// have one boot and unique id.
     pub fn disowns(&mut self, report: &StatusReport, now: Duration) -> bool {
         let shown = self.shown;
-        let claims = |boot: &&mut HeardBoot| {
+        let claims = |boot: &&mut TrackedBoot| {
             Some(boot.id) == shown && boot.fits(report, now) && boot.is_out_of_step(report, now)
         };
         self.list.iter_mut().find(claims).map(|boot| boot.contradict(now)).is_some()
     }
 
-    /// Takes a flight status, and says which boot it comes from. The first one is shown.
-    pub fn hear(&mut self, report: &StatusReport, now: Duration) -> BootId {
+    /// Assigns a flight status to a boot and returns it. The first boot is shown.
+    pub fn identify(&mut self, report: &StatusReport, now: Duration) -> BootId {
         let fitting = self.list.iter_mut().filter(|boot| boot.fits(report, now));
         if let Some(boot) = fitting.min_by_key(|boot| boot.away_ms(report.clock_ms, now).abs()) {
-            boot.hear(report, now);
+            boot.update(report, now);
             return boot.id;
         }
         let id = BootId(self.next_id);
         self.next_id = self.next_id.wrapping_add(1);
         if self.list.len() == BOOTS_MAX {
-            let kept = [self.shown, self.chosen];
+            let retained = [self.shown, self.chosen];
             let oldest = (0..BOOTS_MAX)
-                .filter(|place| !kept.contains(&Some(self.list[*place].id)))
-                .min_by_key(|place| (self.list[*place].is_busy, self.list[*place].heard_at));
+                .filter(|place| !retained.contains(&Some(self.list[*place].id)))
+                .min_by_key(|place| (self.list[*place].is_busy, self.list[*place].received_at));
             self.list.remove(oldest.unwrap_or(0));
         }
-        let mut boot = HeardBoot { id, uid: report.uid, number: report.boot, ..HeardBoot::default() };
-        boot.hear(report, now);
+        let mut boot = TrackedBoot { id, uid: report.uid, number: report.boot, ..TrackedBoot::default() };
+        boot.update(report, now);
         self.list.push(boot);
         self.shown.get_or_insert(id);
         id
@@ -299,19 +297,19 @@ impl Boots {
     /// Which boot another message comes from: the one that it names, or the only one at this
     /// source, else by its clock or its sequence number; `None` before the first flight status.
     /// What fits several goes to the shown one.
-    pub fn speaker(
+    pub fn sender(
         &self,
         source: u16,
         (number, clock_ms, sequence): (Option<u32>, Option<u32>, u8),
         now: Duration,
     ) -> Option<BootId> {
         let shown = self.shown_boot()?;
-        let named = |boot: &HeardBoot| number.is_some_and(|number| boot.is_number(number));
-        let here = |boot: &HeardBoot| boot.is_heard(now) && boot.is_at(source);
+        let named = |boot: &TrackedBoot| number.is_some_and(|number| boot.is_number(number));
+        let here = |boot: &TrackedBoot| boot.is_received(now) && boot.is_at(source);
         if let Some(only) = self.only(named).or_else(|| self.only(here)) {
             return Some(only);
         }
-        let off = |boot: &HeardBoot| match clock_ms {
+        let off = |boot: &TrackedBoot| match clock_ms {
             Some(clock_ms) => boot.away_ms(clock_ms, now).abs(),
             None => boot.behind(sequence),
         };
@@ -320,18 +318,17 @@ impl Boots {
         Some(nearest.unwrap_or(shown).id)
     }
 
-    /// Whether a message names a boot that has not reported yet: it is of somebody who has not said
-    /// who it is.
+    /// Whether a message names a boot that has not reported yet: its sender is not identified.
     pub fn is_stray(&self, number: u32) -> bool {
         self.shown.is_some() && !self.list.iter().any(|boot| boot.is_number(number))
     }
 
     /// Whether a source is another address of the link over which the shown boot reports, and no
-    /// boot has reported from it: somebody else speaks there, and has not said yet who it is.
+    /// boot has reported from it: its sender is another one, not identified yet.
     pub fn is_strange(&self, source: u16, now: Duration) -> bool {
-        let reports_beside = |boot: &HeardBoot| {
+        let reports_beside = |boot: &TrackedBoot| {
             let beside = |known: &Source| link_of(known.number) == link_of(source);
-            is_within(boot.heard_at, ALIVE_WITHIN, now) && boot.sources.iter().any(beside)
+            is_within(boot.received_at, ALIVE_WITHIN, now) && boot.sources.iter().any(beside)
         };
         self.shown_boot().is_some_and(reports_beside) && !self.list.iter().any(|boot| boot.is_at(source))
     }
@@ -341,51 +338,50 @@ impl Boots {
         self.list.iter_mut().filter(|boot| boot.id == id).for_each(|boot| boot.is_busy = is_busy);
     }
 
-    /// Decides which boot is shown. Returns the one that takes the screen.
-    ///
-    /// The shown one keeps it for as long as it is heard, and a single frame of another one never
-    /// takes it. It goes to a boot that was chosen by name; to the next boot of the same vehicle,
-    /// after a reset; and from an idle vehicle to one from the same source that is armed or flies.
+    /// Decides which boot is shown. Returns the one that takes the screen. The shown boot stays on
+    /// the screen while it is received; a single frame of another one never replaces it. It is
+    /// replaced by a boot chosen by name; by the next boot of the same vehicle, after a reset; and,
+    /// while idle, by one from the same source that is armed or flies.
     pub fn settle(&mut self, now: Duration) -> Option<BootId> {
         let shown = self.shown_boot()?;
         let chosen =
-            self.chosen.and_then(|id| self.of(id)).filter(|boot| boot.is_heard(now)).map(|boot| boot.id);
-        let silence = now.saturating_sub(shown.heard_at);
-        let takes = |boot: &&HeardBoot| {
-            let reports = boot.reports_at.iter().filter(|at| **at > shown.heard_at).count();
+            self.chosen.and_then(|id| self.of(id)).filter(|boot| boot.is_received(now)).map(|boot| boot.id);
+        let silence = now.saturating_sub(shown.received_at);
+        let takes = |boot: &&TrackedBoot| {
+            let reports = boot.reports_at.iter().filter(|at| **at > shown.received_at).count();
             let near = boot.shares_a_source(shown);
-            let after = if near && boot.follows(shown) { RESET_AFTER } else { GONE_AFTER };
+            let after = if near && boot.follows(shown) { RESET_AFTER } else { BOOT_EXPIRES_AFTER };
             let is_alone = silence >= after && reports > 1;
             boot.id != shown.id
-                && boot.is_heard(now)
+                && boot.is_received(now)
                 && (is_alone || (near && boot.is_busy && !shown.is_busy && boot.is_steady(now)))
         };
         let next = chosen.unwrap_or_else(|| {
             let taking = self.list.iter().filter(takes);
-            taking.max_by_key(|boot| (boot.is_busy, boot.heard_at)).map_or(shown.id, |boot| boot.id)
+            taking.max_by_key(|boot| (boot.is_busy, boot.received_at)).map_or(shown.id, |boot| boot.id)
         });
         self.chosen = chosen;
         let changed = self.shown.replace(next) != Some(next);
         changed.then_some(next)
     }
 
-    /// The crew chooses this boot by name. Returns false if it is not heard, or not the only one of
+    /// Selects this boot by its number. Returns false if it is not received, or not the only one of
     /// its number.
     pub fn choose(&mut self, number: u32, now: Duration) -> bool {
-        let only = self.only(|boot| boot.number == number && boot.is_heard(now));
+        let only = self.only(|boot| boot.number == number && boot.is_received(now));
         self.chosen = only.or(self.chosen);
         only.is_some()
     }
 
-    /// Other vehicles that are heard beside the shown one.
+    /// Other vehicles received beside the shown one.
     pub fn beside(&self, now: Duration) -> Vec<Beside> {
-        let Some(shown) = self.shown_boot().filter(|shown| shown.is_heard(now)) else { return Vec::new() };
-        let is_other = |boot: &&HeardBoot| {
+        let Some(shown) = self.shown_boot().filter(|shown| shown.is_received(now)) else { return Vec::new() };
+        let is_other = |boot: &&TrackedBoot| {
             let is_same = boot.shares_a_source(shown) && (boot.follows(shown) || shown.follows(boot));
-            boot.id != shown.id && boot.is_heard(now) && !is_same
+            boot.id != shown.id && boot.is_received(now) && !is_same
         };
         let others = self.list.iter().filter(is_other).map(|boot| Beside::Boot(boot.id, boot.number));
-        let twin = self.list.iter().any(|boot| boot.is_heard(now) && boot.is_of_two(now));
+        let twin = self.list.iter().any(|boot| boot.is_received(now) && boot.is_of_two(now));
         others.chain(twin.then_some(Beside::Twin)).collect()
     }
 
@@ -393,24 +389,26 @@ impl Boots {
     /// has a number that no other one has.
     pub fn is_chosen(&self, now: Duration) -> bool {
         let Some(shown) = self.shown_boot() else { return false };
-        let same = self.list.iter().filter(|boot| boot.number == shown.number && boot.is_heard(now)).count();
+        let same =
+            self.list.iter().filter(|boot| boot.number == shown.number && boot.is_received(now)).count();
         self.chosen == self.shown && shown.number > 0 && same == 1 && !shown.is_of_two(now)
     }
 
-    /// How long ago a boot was heard.
+    /// Time since the last report of a boot.
     pub fn age(&self, id: BootId, now: Duration) -> Option<Duration> {
-        self.of(id).map(|boot| now.saturating_sub(boot.heard_at))
+        self.of(id).map(|boot| now.saturating_sub(boot.received_at))
     }
 }
 
-// The vehicles of these boots: the shown one is the model's, and the others are kept beside it.
+// The vehicles of these boots: the model shows one, and stores the others beside it.
 
 impl Model {
-    /// The vehicles that are heard beside the shown one, in words; `None` if it is alone.
+    /// The vehicles received beside the shown one, in words; `None` if it is alone.
     pub fn beside(&self, now: Duration) -> Option<String> {
-        let is_heard = |at: Duration| is_within(at, GONE_AFTER, now);
-        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_heard(status.received_at));
-        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_heard(foreign.received_at));
+        let is_received = |at: Duration| is_within(at, BOOT_EXPIRES_AFTER, now);
+        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_received(status.received_at));
+        let foreign =
+            self.vehicle.foreign.as_ref().filter(|foreign| ours && is_received(foreign.received_at));
         let words = self.boots.beside(now).into_iter().map(|other| match other {
             Beside::Boot(_, 0) => "one without a boot number".to_owned(),
             Beside::Boot(id, boot) => {
@@ -442,7 +440,7 @@ impl Model {
         shown.into_iter().chain(others).collect()
     }
 
-    /// Other boots that are heard, which the crew may choose by name.
+    /// Boot numbers of the other vehicles, among which the crew may choose.
     pub fn other_boots(&self, now: Duration) -> Vec<u32> {
         let boot = |other| match other {
             Beside::Boot(_, boot) if boot > 0 => Some(boot),
@@ -451,13 +449,13 @@ impl Model {
         self.boots.beside(now).into_iter().filter_map(boot).collect()
     }
 
-    /// The vehicles that are heard: the shown one, and those beside it.
+    /// All received vehicles: the shown one, and those beside it.
     pub fn every_vehicle(&self, now: Duration) -> impl Iterator<Item = &Vehicle> {
-        let heard = self
+        let received = self
             .others
             .iter()
-            .filter(move |(id, _)| self.boots.age(**id, now).is_some_and(|age| age < GONE_AFTER));
-        std::iter::once(&self.vehicle).chain(heard.map(|(_, vehicle)| vehicle))
+            .filter(move |(id, _)| self.boots.age(**id, now).is_some_and(|age| age < BOOT_EXPIRES_AFTER));
+        std::iter::once(&self.vehicle).chain(received.map(|(_, vehicle)| vehicle))
     }
 }
 
@@ -474,8 +472,8 @@ fn state_words(vehicle: &Vehicle) -> String {
     format!("{phase} {armed}{left}")
 }
 
-/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it keeps
-/// the screen.
+/// Whether a vehicle is armed, in a countdown, in flight, or down and not yet safe: then it stays
+/// on the screen.
 pub(crate) fn is_busy(vehicle: &Vehicle, now: Duration) -> bool {
     let is_armed_on_pad = vehicle.phase_now() == Some(TdPhase::TD_PHASE_PAD_ARMED);
     vehicle.is_armed() || is_armed_on_pad || vehicle.in_flight() || KeepAway::of(vehicle, now).is_some()
@@ -527,20 +525,20 @@ mod tests {
     fn a_second_vehicle_is_one_at_once_and_does_not_take_the_screen() {
         let mut boots = Boots::default();
         let [mut first, mut second] = [Sender::new(1, 7, 0), Sender::new(2, 9, 20_000)];
-        let shown = boots.hear(&first.report(10_000), at(10_000));
+        let shown = boots.identify(&first.report(10_000), at(10_000));
         for ms in (10_000..60_000).step_by(100) {
-            boots.hear(&first.report(ms), at(ms));
+            boots.identify(&first.report(ms), at(ms));
             if ms >= 20_000 {
-                boots.hear(&second.report(ms), at(ms));
+                boots.identify(&second.report(ms), at(ms));
                 assert_eq!(beside(&boots, at(ms)), 1, "{ms}");
             }
             assert_eq!((boots.settle(at(ms)), boots.shown()), (None, Some(shown)));
         }
         // The shown one is switched off: 10 s later the other one is alone, and has the screen.
         for ms in (60_000..71_000).step_by(100) {
-            let heard = boots.hear(&second.report(ms), at(ms));
+            let boot = boots.identify(&second.report(ms), at(ms));
             let takes = boots.settle(at(ms));
-            assert_eq!(takes, (ms == 69_900).then_some(heard), "{ms}");
+            assert_eq!(takes, (ms == 69_900).then_some(boot), "{ms}");
         }
         assert_eq!(beside(&boots, at(70_000)), 0);
     }
@@ -550,10 +548,10 @@ mod tests {
         let mut boots = Boots::default();
         let [mut before, mut after] = [Sender::new(1, 7, 0), Sender::new(1, 7, 30_500)];
         for ms in (0..30_000).step_by(100) {
-            boots.hear(&before.report(ms), at(ms));
+            boots.identify(&before.report(ms), at(ms));
         }
         let taken = (31_000..34_000).step_by(100).find(|ms| {
-            boots.hear(&after.report(*ms), at(*ms));
+            boots.identify(&after.report(*ms), at(*ms));
             assert_eq!(beside(&boots, at(*ms)), 0, "{ms}");
             boots.settle(at(*ms)).is_some()
         });
@@ -561,7 +559,7 @@ mod tests {
     }
 
     #[test]
-    fn two_vehicles_with_one_boot_and_one_unique_id_are_told_by_their_clocks_or_sequence_numbers() {
+    fn two_vehicles_with_one_boot_and_one_unique_id_differ_by_clock_or_sequence_number() {
         for (apart_ms, sources) in
             [(0, [0, 0]), (300, [0, 0]), (3_000, [0, 1]), (60_000, [0, 0]), (60_000, [0, 1])]
         {
@@ -571,7 +569,7 @@ mod tests {
             for ms in (100_000..103_000).step_by(100) {
                 let two = &mut both;
                 for sender in two {
-                    boots.hear(&sender.report(ms), at(ms));
+                    boots.identify(&sender.report(ms), at(ms));
                 }
                 boots.settle(at(ms));
             }
@@ -590,7 +588,7 @@ mod tests {
         for ms in (10_000..20_000).step_by(100) {
             let report = ours.report(ms);
             assert!(!boots.disowns(&report, at(ms)));
-            boots.hear(&report, at(ms));
+            boots.identify(&report, at(ms));
             // The same over another link, and a copy that another way of the same link brings
             // first.
             for (source, later) in [(0x201, 0), (0x102, 1)] {
@@ -625,17 +623,17 @@ mod tests {
                 ours.source = if ms < 15_000 { 0x101 } else { 0x102 };
                 let report = ours.report(ms);
                 assert!(!boots.disowns(&report, at(ms)), "{ms} after {pause_ms}");
-                boots.hear(&report, at(ms));
+                boots.identify(&report, at(ms));
                 assert_eq!(beside(&boots, at(ms)), 0);
             }
         }
     }
 
     proptest! {
-        /// Whatever else is heard, in any order and at any rate: the shown vehicle keeps the screen
-        /// while it is heard.
+        /// The shown vehicle stays on the screen while it is received, whatever other frames arrive
+        /// in any order and at any rate.
         #[test]
-        fn nothing_takes_the_screen_from_a_vehicle_that_is_heard(
+        fn no_vehicle_takes_the_screen_from_one_that_is_received(
             others in prop::collection::vec(
                 (0_u16..3, 0_u32..4, 0_u64..100_000, 0_u16..2, any::<bool>(), any::<u8>()), 1..300,
             ),
@@ -644,7 +642,7 @@ mod tests {
         ) {
             let mut boots = Boots::default();
             let mut ours = Sender::new(9, 9, 0);
-            let shown = boots.hear(&ours.report(100_000), at(100_000));
+            let shown = boots.identify(&ours.report(100_000), at(100_000));
             boots.note(shown, true);
             let mut now_ms = 100_000;
             let mut others = others.iter().cycle();
@@ -656,13 +654,13 @@ mod tests {
                     if let Some((uid, boot, clock_ms, source, _, sequence)) = others.next() {
                         let clock_ms = *clock_ms as u32;
                         let report = StatusReport { uid: *uid, boot: *boot, clock_ms, sequence: *sequence, source: *source };
-                        let heard = boots.hear(&report, at(now_ms));
-                        boots.note(heard, is_busy);
+                        let id = boots.identify(&report, at(now_ms));
+                        boots.note(id, is_busy);
                         prop_assert_eq!(boots.settle(at(now_ms)), None);
                     }
                     prop_assert!(boots.list.len() <= BOOTS_MAX && boots.shown() == Some(shown));
                 }
-                prop_assert_eq!(boots.hear(&ours.report(now_ms), at(now_ms)), shown);
+                prop_assert_eq!(boots.identify(&ours.report(now_ms), at(now_ms)), shown);
             }
         }
 
@@ -675,19 +673,19 @@ mod tests {
         ) {
             let mut boots = Boots::default();
             let mut ours = Sender::new(1, 1, 0);
-            let shown = boots.hear(&ours.report(100_000), at(100_000));
+            let shown = boots.identify(&ours.report(100_000), at(100_000));
             let mut forged = forged.into_iter();
             for ms in (100_100..120_000).step_by(100) {
                 if ms % 4_000 == 0 && let Some((uid, boot, clock_ms, source, sequence)) = forged.next() {
-                    let heard = boots.hear(&StatusReport { uid, boot, clock_ms, sequence, source }, at(ms));
-                    if heard != shown {
-                        boots.note(heard, is_busy);
+                    let id = boots.identify(&StatusReport { uid, boot, clock_ms, sequence, source }, at(ms));
+                    if id != shown {
+                        boots.note(id, is_busy);
                     }
                 }
                 let report = ours.report(ms);
-                prop_assert_eq!(boots.hear(&report, at(ms)), shown);
+                prop_assert_eq!(boots.identify(&report, at(ms)), shown);
                 // Everything else that ours says is still taken for ours.
-                prop_assert_eq!(boots.speaker(report.source, (None, None, report.sequence.wrapping_add(1)), at(ms)), Some(shown));
+                prop_assert_eq!(boots.sender(report.source, (None, None, report.sequence.wrapping_add(1)), at(ms)), Some(shown));
                 prop_assert_eq!(boots.settle(at(ms)), None);
             }
         }
@@ -713,12 +711,12 @@ mod tests {
             }
             let mut boots = Boots::default();
             for (now, report) in &sent {
-                boots.hear(report, *now);
+                boots.identify(report, *now);
                 boots.settle(*now);
                 prop_assert_eq!(boots.beside(*now), vec![]);
             }
             let (now, report) = sent[sent.len() - 1];
-            let last = boots.hear(&report, now);
+            let last = boots.identify(&report, now);
             prop_assert_eq!(boots.shown(), Some(last));
         }
     }

@@ -1,8 +1,6 @@
 //! The checklist of a mission: its steps, who signs each, and what has been signed; and its text
-//! form.
-//!
-//! The station keeps it; every screen of the station shows the same. The vehicle is not armed from
-//! here before every step is done.
+//! form. The station stores it; every screen of the station shows the same. The station does not
+//! arm before every step is done.
 
 use std::time::Duration;
 
@@ -26,7 +24,7 @@ pub const WORDS_MAX: usize = 60;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checklist {
     pub name: String,
-    /// The name of the only mission that it is for, as the vehicle tells it; `None` for any.
+    /// The name of the only mission that it applies to, as the vehicle reports it; `None` for any.
     pub mission: Option<String>,
     /// The first eight bytes of the SHA-256 of its text, as hexadecimal digits. Signatures count for
     /// this text only.
@@ -36,18 +34,18 @@ pub struct Checklist {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// What is to be done or seen.
+    /// The action or observation.
     pub words: String,
     /// The role that signs; `None` for anybody who may command.
     #[serde(with = "role_words")]
     pub role: Option<TdRole>,
-    /// A value of the vehicle that must keep its limits, when the step is signed and as long as it
+    /// A value of the vehicle that must be within its limits when the step is signed, and while it
     /// counts.
     pub value: Option<Limits>,
     pub mark: Mark,
 }
 
-/// A value that the vehicle sends, and what it must keep.
+/// A value that the vehicle sends, with its limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     #[serde(with = "quantity_name")]
@@ -73,7 +71,7 @@ impl Limits {
     }
 }
 
-/// What has become of a step.
+/// The status of a step.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub enum Mark {
     #[default]
@@ -143,7 +141,7 @@ mod role_words {
     }
 }
 
-/// A change of a checklist, for the file that keeps it.
+/// A change of a checklist, for the file of its signatures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ChecklistEntry {
     Marked {
@@ -227,7 +225,9 @@ impl Model {
                     return Some(format!("the checklist is for {mission}, the vehicle flies {flies}"));
                 }
                 None => {
-                    return Some(format!("the vehicle has not said whether it flies {mission} (checklist)"));
+                    return Some(format!(
+                        "the vehicle has not reported whether it flies {mission} (checklist)"
+                    ));
                 }
             }
         }
@@ -252,7 +252,7 @@ impl Model {
             _ if self.vehicle.is_armed() => Err("the vehicle is armed: disarm first".to_owned()),
             _ if self.vehicle.in_flight() => Err("the vehicle is in flight".to_owned()),
             _ if self.settings.crew_roles.is_empty() => Ok(None),
-            None if by.is_empty() => Err("nobody is named (--operator)".to_owned()),
+            None if by.is_empty() => Err("no operator is named (--operator)".to_owned()),
             None => Err(format!("{by} is not in the crew (--operator)")),
             Some((_, TdRole::TD_ROLE_OBSERVER)) => Err(format!("{by} is an observer")),
             Some((_, role)) => Ok(Some(*role)),

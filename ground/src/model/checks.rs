@@ -1,29 +1,27 @@
-//! The vehicle's arming checks: which fail, in its own words, and for which it has held the
-//! countdown.
+//! The vehicle's arming checks: which fail, in its words, and for which it has held the countdown.
 
 use protocol::dialect::{TdCheck, TdHold, TdPhase};
 
 use super::{Vehicle, words};
 
-/// Sensors name themselves in what is wrong with them; of other checks the vehicle says what it
-/// found.
+/// Checks whose texts name the sensor at fault; the texts of other checks state the value found.
 pub const SENSORS: TdCheck = TdCheck::TD_CHECK_ACCELEROMETER
     .union(TdCheck::TD_CHECK_GYRO)
     .union(TdCheck::TD_CHECK_BAROMETER)
     .union(TdCheck::TD_CHECK_GNSS)
     .union(TdCheck::TD_CHECK_LIDAR);
 
-/// What the vehicle has told of its checks, beside which of them fail.
+/// The vehicle's texts about its checks, beside which of them fail.
 #[derive(Debug, Clone, Default)]
-pub struct ToldChecks {
-    /// Its words for a check, the newest last.
-    told: Vec<(TdCheck, String)>,
-    /// The check for which it holds the countdown: it is named on when it passes again.
+pub struct ReportedChecks {
+    /// Text of each check, the newest last.
+    reported: Vec<(TdCheck, String)>,
+    /// The check for which it holds the countdown; it stays named after it passes again.
     held: Option<TdCheck>,
 }
 
 impl Vehicle {
-    /// The failing checks, each in the vehicle's words if it has told them, otherwise by its name.
+    /// The failing checks, each in the vehicle's words if they have arrived, otherwise by its name.
     pub fn failing(&self) -> Vec<(TdCheck, String)> {
         let failed = self.status.as_ref().map_or(TdCheck::empty(), |status| status.value.checks_failed);
         failed.iter().map(|check| (check, self.words_of(check))).collect()
@@ -35,8 +33,8 @@ impl Vehicle {
         (!failing.is_empty()).then(|| failing.join(", "))
     }
 
-    /// The first check that forbids the start, by its name and in words. The uplink of the station
-    /// that asks is the vehicle's to judge, and has an alarm of its own.
+    /// The first check that forbids the start, by its name and in words. The vehicle judges the
+    /// requesting station's uplink, and a lost uplink has a separate alarm.
     pub fn unfit(&self) -> Option<(String, String)> {
         let fails = |(check, _): &(TdCheck, String)| *check != TdCheck::TD_CHECK_UPLINK;
         self.failing().into_iter().find(fails).map(|(check, words)| (name(check), words))
@@ -61,41 +59,41 @@ impl Vehicle {
         TdCheck::all().difference(height)
     }
 
-    /// Its own words for a check, if it has told them.
-    pub fn told_of(&self, check: TdCheck) -> Option<&str> {
-        self.checks.told.iter().find(|(told, _)| *told == check).map(|(_, words)| words.as_str())
+    /// Its words for a check, if they have arrived.
+    pub fn reported_words(&self, check: TdCheck) -> Option<&str> {
+        self.checks.reported.iter().find(|(reported, _)| *reported == check).map(|(_, words)| words.as_str())
     }
 
     fn words_of(&self, check: TdCheck) -> String {
-        self.told_of(check).map_or_else(|| name(check), str::to_owned)
+        self.reported_words(check).map_or_else(|| name(check), str::to_owned)
     }
 
-    /// Takes what it says of a check. Its flight status says whether that still fails.
-    pub(crate) fn hear_of_check(&mut self, text: &str) {
+    /// Stores its text about a check. Its flight status reports whether the check still fails.
+    pub(crate) fn note_check_text(&mut self, text: &str) {
         let text =
             text.strip_prefix("not ready: ").or_else(|| text.strip_prefix("armed, and ")).unwrap_or(text);
         let text = text.split_once(" refused: ").map_or(text, |(_, reason)| reason);
         let Some(check) = check_of(text) else { return };
-        self.checks.told.retain(|(told, _)| *told != check);
-        self.checks.told.push((check, in_short(text, check)));
+        self.checks.reported.retain(|(reported, _)| *reported != check);
+        self.checks.reported.push((check, in_short(text, check)));
         let holds =
             self.status.as_ref().is_some_and(|status| status.value.hold == TdHold::TD_HOLD_CHECK_FAILED);
         self.checks.held = self.checks.held.or_else(|| holds.then_some(check));
     }
 
-    /// Notes for which check it holds, and forgets its words for what passes again.
+    /// Updates the check for which it holds, and removes the texts of checks that pass again.
     pub(crate) fn note_checks(&mut self) {
         let Some(status) = self.status.as_ref().map(|status| &status.value) else { return };
-        let Self { checks: ToldChecks { told, held }, .. } = self;
+        let Self { checks: ReportedChecks { reported, held }, .. } = self;
         let failed = status.checks_failed;
         if status.hold == TdHold::TD_HOLD_CHECK_FAILED {
-            // It says the check just before the hold.
+            // It reports the check just before the hold.
             let first = || failed.iter().find(|check| *check != TdCheck::TD_CHECK_UPLINK);
-            *held = held.or_else(|| told.last().map(|(check, _)| *check)).or_else(first);
+            *held = held.or_else(|| reported.last().map(|(check, _)| *check)).or_else(first);
         } else {
             *held = None;
         }
-        told.retain(|(check, _)| failed.contains(*check) || *held == Some(*check));
+        reported.retain(|(check, _)| failed.contains(*check) || *held == Some(*check));
     }
 }
 

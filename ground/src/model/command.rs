@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
 use super::{
-    Ask, FlownMission, GONE_AFTER, LinkState, Model, PadCheck, Prompt, RED_AFTER, Seat, Settings, Vehicle,
-    foreign_name, is_on_pad, words,
+    BOOT_EXPIRES_AFTER, FlownMission, LinkState, Model, PadCheck, Prompt, Proposal, RED_AFTER, Seat,
+    Settings, Vehicle, foreign_name, is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little
@@ -25,7 +25,7 @@ pub enum CommandKind {
     Disarm,
     Start,
     Abort,
-    /// Confirm what another operator asks.
+    /// Confirm another operator's request.
     ConfirmArm,
     ConfirmStart,
     /// Hold the countdown.
@@ -50,24 +50,23 @@ pub struct CommandRow {
     pub name: &'static str,
     /// The MAVLink command and its first parameter.
     pub mav: (MavCmd, f32),
-    /// Whether it can make something move or light: then it names the boot that it is meant for,
-    /// and is sent only to the vehicle that is shown.
+    /// Whether it can move or ignite anything: then it names the boot it is addressed to, and is
+    /// sent only to the shown vehicle.
     pub(crate) moves: bool,
     /// How often the command is resent.
     pub(crate) resend: Resend,
-    /// What in the vehicle's own state shows the effect, for the event "observed"; `None` if its
-    /// answer has to do.
+    /// Evidence of the effect in the vehicle's state, for the event "observed"; `None` if the
+    /// answer is the only evidence.
     pub(crate) seen: Option<&'static str>,
 }
 
 impl CommandKind {
     pub const ALL: &'static [Self] = Self::VARIANTS;
 
-    /// What a command is, but for when it may be given.
-    ///
-    /// A repetition has the number of the command, and the vehicle does it once: a late one arms
-    /// nothing that was disarmed since. A tap is for one moment. A check is not repeated either: it
-    /// would move what somebody has just laid hands on.
+    /// What a command is, but for when it may be given. A repetition has the number of the command,
+    /// and the vehicle executes it once: a late one arms nothing that was disarmed since. A tap is
+    /// valid for a moment only. A check is not repeated either: it would move a surface that a
+    /// person has just touched.
     pub fn row(self) -> CommandRow {
         use MavCmd::{
             MAV_CMD_COMPONENT_ARM_DISARM as ARM, MAV_CMD_DO_FLIGHTTERMINATION as TERMINATE,
@@ -77,11 +76,11 @@ impl CommandKind {
         use Resend::{Never, Times, UntilAnswered, UntilWithdrawn};
         let row = |name, mav, moves, resend, seen| CommandRow { name, mav, moves, resend, seen };
         match self {
-            Self::Arm => row("ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
-            Self::Disarm => row("DISARM", (ARM, 0.0), false, UntilAnswered, Some("HEARTBEAT says disarmed")),
+            Self::Arm => row("ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT armed")),
+            Self::Disarm => row("DISARM", (ARM, 0.0), false, UntilAnswered, Some("HEARTBEAT disarmed")),
             Self::Start => row("START", (START, 0.0), true, Times(4), Some("countdown runs")),
             Self::Abort => row("ABORT", (TERMINATE, 1.0), false, UntilWithdrawn, Some("abort latched")),
-            Self::ConfirmArm => row("CONFIRM ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT says armed")),
+            Self::ConfirmArm => row("CONFIRM ARM", (ARM, 1.0), true, Times(4), Some("HEARTBEAT armed")),
             Self::ConfirmStart => row("CONFIRM START", (START, 0.0), true, Times(4), Some("countdown runs")),
             Self::Hold => row("HOLD", (PAUSE, 0.0), false, UntilAnswered, Some("no countdown")),
             Self::Tap => row("TAP", (TAP, 0.0), true, Never, None),
@@ -93,8 +92,7 @@ impl CommandKind {
         }
     }
 
-    /// Whether only the owner of the station's key gives it: everything but what anybody may do to
-    /// stop something.
+    /// Whether only the owner of the station's key may give it; anyone may stop something.
     pub fn needs_the_owner(self) -> bool {
         !matches!(self, Self::Hold | Self::Abort | Self::EndCheck)
     }
@@ -118,7 +116,7 @@ impl CommandKind {
                 heartbeat.is_some_and(|heartbeat| heartbeat.value.terminated)
                     || status.is_some_and(|status| status.value.interlocks.contains(latched))
             }
-            // The answer is all there is to see.
+            // The answer is the only evidence.
             _ => false,
         }
     }
@@ -130,7 +128,7 @@ impl CommandKind {
         let status = vehicle.status.as_ref().filter(|status| status.received_at > since)?;
         let on_pad = is_on_pad(status.value.phase);
         match self {
-            Self::Arm | Self::ConfirmArm if on_pad && !heartbeat.armed => Some("HEARTBEAT says disarmed"),
+            Self::Arm | Self::ConfirmArm if on_pad && !heartbeat.armed => Some("HEARTBEAT disarmed"),
             Self::Start | Self::ConfirmStart if on_pad && status.value.countdown_ms == i32::MAX => {
                 Some("no countdown runs")
             }
@@ -150,8 +148,8 @@ pub enum Acknowledgement {
     Waiting,
     /// The vehicle is executing the command.
     InProgress,
-    /// Noted by the vehicle: a second person has to confirm it.
-    Asked,
+    /// Accepted by the vehicle as a request that a second person has to confirm.
+    AwaitsConfirmation,
     /// Answered with this `MAV_RESULT`.
     Answered(u8),
     /// No answer came, and none is expected any more.
@@ -229,8 +227,8 @@ impl Commands {
 
 // Whether the ground may command to arm and to start.
 
-/// Why nothing that can move is commanded now: it is not certain which vehicle, or which station,
-/// would be obeyed.
+/// Why no command that moves anything is sent now: it is not certain which vehicle would receive
+/// it, or which station the vehicle obeys.
 pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     let Settings { us, vehicle: of, .. } = &model.settings;
     let vehicle = &model.vehicle;
@@ -239,11 +237,11 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
             format!("TWO VEHICLES under id {}: switch one off", of.system_id)
         }
-        Some(foreign) if foreign.age(now) < GONE_AFTER => {
+        Some(foreign) if foreign.age(now) < BOOT_EXPIRES_AFTER => {
             format!("not a Touchdown vehicle: {}", foreign_name(foreign))
         }
         _ if vehicle.status.is_none() => {
-            "it is not known yet what the vehicle is: it has sent no flight status".to_owned()
+            "the vehicle is not identified: it has sent no flight status".to_owned()
         }
         _ if model.link.shares_our_id(now) => {
             format!("another station uses our id {system_id}/{component_id}: give one another --sysid")
@@ -252,24 +250,24 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
     })
 }
 
-/// Why no command reaches the vehicle that is meant: it is silent, what it says arrives late, or
-/// nothing may be commanded.
+/// Why no command reaches the intended vehicle: it is silent, its telemetry arrives late, or no
+/// command may be sent.
 pub fn why_not_reached(model: &Model, now: Duration) -> Option<String> {
     if !model.link.state(now).carries() {
-        return Some("the vehicle is not heard".to_owned());
+        return Some("no telemetry from the vehicle".to_owned());
     }
     let LinkState::Lost(age) = model.link.down(now) else { return why_nothing_moves(model, now) };
     let (age_s, most_s) = (age.as_secs_f64(), RED_AFTER.as_secs());
-    Some(format!("what the vehicle said last is {age_s:.1} s old, at most {most_s} s would do"))
+    Some(format!("the newest telemetry is {age_s:.1} s old, at most {most_s} s is accepted"))
 }
 
-/// Why this seat does not act with the station's key. A hold and an abort are anybody's.
+/// Why this seat does not act with the station's key. Anyone may hold and abort.
 pub fn why_not_seat(model: &Model, by: &Seat) -> Option<String> {
     let owner = model.settings.key_owner.as_ref()?;
     let is_theirs = by.operator == owner.name || *by == Seat::automatic();
     let name = &owner.name;
     (!is_theirs).then(|| {
-        format!("this station signs as {name}: only a screen of {name} does that (a hold, an abort anybody)")
+        format!("this station signs as {name}: only a screen of {name} does that (anyone may hold or abort)")
     })
 }
 
@@ -280,7 +278,7 @@ pub fn why_not_here(model: &Model) -> Option<String> {
 }
 
 /// Why the ground does not command to arm. Failing checks are left for the vehicle to refuse, with
-/// its own text.
+/// its text.
 pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
     let uplink = &model.link.uplink;
     why_not_reached(model, now)
@@ -290,7 +288,8 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         })
         .or_else(|| model.vehicle.wait_before(now).map(|away| format!("do not approach{}", away.reason())))
         .or_else(|| {
-            (!uplink.is_proven(now)).then(|| format!("the uplink is not proven: {}", uplink.why_unheard()))
+            (!uplink.is_proven(now))
+                .then(|| format!("the uplink is not proven: {}", uplink.why_not_received()))
         })
         .or_else(|| why_no_key(model))
         .or_else(|| why_other_mission(model))
@@ -301,8 +300,8 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.why_no_log(now))
 }
 
-/// Why the vehicle is not ready to be armed, its own checks among it. What a screen says as NO-GO,
-/// and the voice.
+/// Why the vehicle is not ready to be armed, including its checks: the NO-GO of the screens and the
+/// voice.
 pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
     let uplink = || "uplink not proven, every other check passes".to_owned();
     why_not_reached(model, now)
@@ -314,9 +313,8 @@ pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.why_no_log(now))
 }
 
-/// Why a real vehicle's motor is not known well enough: no burn of its lot has confirmed the
-/// certified curve, as far as the vehicle has said. `None` if one has, on a simulated vehicle, and
-/// once the crew goes on nevertheless.
+/// Why a real vehicle's motor is unconfirmed: the vehicle reports no burn of its lot that confirms
+/// the certified curve. `None` if one does, on a simulated vehicle, and once the crew overrules it.
 pub fn why_untested(model: &Model) -> Option<String> {
     let boot = model.vehicle.boot.number();
     if model.vehicle.boot.is_simulated() || (boot.is_some() && model.untested == boot) {
@@ -325,7 +323,7 @@ pub fn why_untested(model: &Model) -> Option<String> {
     match model.vehicle.mission() {
         Some(flown) if flown.motor_burns > 0 => None,
         Some(_) => Some("motor UNCONFIRMED: no burn of its lot".to_owned()),
-        None => Some("motor not known: no mission told yet".to_owned()),
+        None => Some("motor not known: no mission reported yet".to_owned()),
     }
 }
 
@@ -356,19 +354,19 @@ fn why_not_in(model: &Model, fits: fn(TdPhase) -> bool) -> Option<String> {
     }
 }
 
-/// Why the ground does not confirm this ask.
-pub fn why_not_confirm(model: &Model, ask: &Ask, now: Duration) -> Option<String> {
-    match model.ask(now) {
-        Some(waits) if waits.number == ask.number && waits.act == ask.act => {}
-        _ => return Some("it is no longer asked".to_owned()),
+/// Why the ground does not confirm this proposal.
+pub fn why_not_confirm(model: &Model, proposal: &Proposal, now: Duration) -> Option<String> {
+    match model.proposal(now) {
+        Some(waits) if waits.number == proposal.number && waits.act == proposal.act => {}
+        _ => return Some("the request has lapsed".to_owned()),
     }
-    match ask.act {
+    match proposal.act {
         TdAct::TD_ACT_START => why_not_start(model, now),
         _ => why_not_arm(model, now),
     }
 }
 
-/// Why the ground asks for no check of the vehicle, and tests no radio.
+/// Why the ground requests no check of the vehicle, and tests no radio.
 pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
     why_not_reached(model, now)
         .or_else(|| model.vehicle.is_armed().then(|| "armed: disarm first".to_owned()))
@@ -376,11 +374,11 @@ pub fn why_not_check(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| why_not_in(model, is_on_pad))
 }
 
-/// Why nobody can say here that every surface moved as it should.
+/// Why no person can confirm here that every surface moved as it should.
 pub fn why_not_seen(model: &Model, now: Duration) -> Option<String> {
     let seen = model.vehicle.pad_check.as_ref().is_some_and(PadCheck::awaits_eyes);
     why_not_check(model, now)
-        .or_else(|| (!seen).then(|| "no check of servos that tell nothing has passed".into()))
+        .or_else(|| (!seen).then(|| "no check of servos without feedback has passed".into()))
 }
 
 /// Why the ground does not take command.
@@ -391,7 +389,7 @@ pub fn why_not_take(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| why_no_key(model))
 }
 
-/// Why a vehicle with operators would refuse everything that this station asks.
+/// Why a vehicle with operators would refuse every request of this station.
 fn why_no_key(model: &Model) -> Option<String> {
     let observes = model.people().is_some() && model.settings.key_owner.is_none();
     observes.then(|| "no operator's key here (--crew, --operator): this station looks on".to_owned())
@@ -401,19 +399,19 @@ fn why_no_key(model: &Model) -> Option<String> {
 pub fn why_other_mission(model: &Model) -> Option<String> {
     let ours = model.settings.mission?;
     Some(match model.vehicle.mission() {
-        None => format!("the vehicle has not said whether it flies {ours} (--mission)"),
+        None => format!("the vehicle has not reported whether it flies {ours} (--mission)"),
         Some(FlownMission { hash: theirs, name, .. }) if theirs != ours => {
             format!("the vehicle flies {name} {theirs}, --mission is {ours}")
         }
-        Some(FlownMission { start: told, .. }) => {
-            let start = model.settings.start.as_deref().filter(|start| told != Some(*start))?;
-            let begins = told.unwrap_or("where it does not say");
+        Some(FlownMission { start: reported, .. }) => {
+            let start = model.settings.start.as_deref().filter(|start| reported != Some(*start))?;
+            let begins = reported.unwrap_or("not reported");
             format!("the flight begins at: {begins}, --start is {start}")
         }
     })
 }
 
-// How far the automatic mode has come.
+// The state of the automatic mode.
 
 /// The steps of the automatic mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -423,7 +421,7 @@ pub(crate) enum AutoStep {
         not_before: Duration,
     },
     WaitForArmed,
-    /// The countdown runs. Held because one did not hear the other, it is started anew.
+    /// The countdown runs. After a hold for a lost link it is started again.
     Started,
     Done,
 }

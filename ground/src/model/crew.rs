@@ -1,4 +1,4 @@
-//! The crew: who sits at the screens that can command, and the two people who arm and start
+//! The crew: the operators at the screens that can command, and the two people who arm and start
 //! together.
 
 use std::fmt;
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Model, why_not_seat, words};
 
-/// How long a countdown may continue without a commanding screen that answers. The vehicle is to be
-/// held 1 s after the last one has gone: the rest is for the hold and its way.
+/// How long a countdown may continue without a commanding screen that answers. The vehicle must
+/// hold 1 s after the last one has left: the rest is for the hold and its latency.
 pub const UNATTENDED_MAX: Duration = Duration::from_millis(800);
 
 /// The seats at commanding screens: the station's own screen and the attached ones without
@@ -20,24 +20,24 @@ pub struct Crew {
     seats: Vec<Seat>,
     /// The screens that could command if they answered.
     silent: Vec<Seat>,
-    /// When the last one left; `None` while somebody is there.
-    gone_at: Option<Duration>,
+    /// When the last one left; `None` while one is there.
+    absent_since: Option<Duration>,
     /// When the next hold is to be sent; `None` while no hold is needed.
     pub(crate) hold_due: Option<Duration>,
-    /// It was said that a hold comes too late.
-    pub(crate) too_late_told: bool,
+    /// The event that a hold comes too late was reported.
+    pub(crate) too_late_reported: bool,
 }
 
 impl Crew {
-    /// Sets who is there now, and which screens do not answer: they have been silent for
+    /// Sets the present seats, and the screens that do not answer: they have been silent for
     /// [`UNATTENDED_MAX`] already.
     pub fn set_seats(&mut self, seats: Vec<Seat>, silent: Vec<Seat>, now: Duration) {
         if !seats.is_empty() {
-            self.gone_at = None;
+            self.absent_since = None;
         } else if !silent.is_empty() {
-            self.gone_at = Some(now.saturating_sub(UNATTENDED_MAX));
+            self.absent_since = Some(now.saturating_sub(UNATTENDED_MAX));
         } else if !self.seats.is_empty() {
-            self.gone_at = Some(now);
+            self.absent_since = Some(now);
         }
         (self.seats, self.silent) = (seats, silent);
     }
@@ -63,15 +63,15 @@ impl Crew {
     }
 
     /// Whether no commanding screen has been there for too long.
-    pub fn is_gone(&self, now: Duration) -> bool {
-        self.gone_at.is_some_and(|at| now.saturating_sub(at) >= UNATTENDED_MAX)
+    pub fn is_absent(&self, now: Duration) -> bool {
+        self.absent_since.is_some_and(|at| now.saturating_sub(at) >= UNATTENDED_MAX)
     }
 
-    /// A sentence that says who can command.
+    /// A sentence that names who can command.
     pub fn words(&self) -> String {
         let listed = |seats: &[Seat]| seats.iter().map(Seat::to_string).collect::<Vec<_>>().join("; ");
         let there = match &self.seats[..] {
-            [] => "nobody commands".to_owned(),
+            [] => "no commanding screen".to_owned(),
             seats => format!("at the controls: {}", listed(seats)),
         };
         match &self.silent[..] {
@@ -122,13 +122,13 @@ impl fmt::Display for Seat {
     }
 }
 
-// Two people who arm and start together, as the vehicle tells it: who asks, who has to confirm or
-// to tap, who commands.
+// Two people who arm and start together, as the vehicle reports it: who proposes, who has to
+// confirm or to tap, who commands.
 
-/// An ask or a tap is shown for this long after the vehicle was last heard of it.
-const TOLD_FOR: Duration = Duration::from_secs(3);
+/// How long a proposal or a tap is shown after the vehicle's last report of it.
+const CREW_VALID_FOR: Duration = Duration::from_secs(3);
 
-/// The operator whose key signs what a station sends.
+/// The operator whose key signs a station's frames.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyOwner {
     /// The number of the key, 1 to 15.
@@ -136,17 +136,17 @@ pub struct KeyOwner {
     pub name: String,
 }
 
-/// An ask that waits for its confirmation.
+/// A proposal to arm or start that waits for its confirmation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ask {
+pub struct Proposal {
     pub act: TdAct,
     pub number: u16,
-    /// The number of the key of whoever asks.
+    /// The key number of the proposer.
     pub by: u8,
     pub left: Duration,
 }
 
-impl Ask {
+impl Proposal {
     /// As in `asks to arm`.
     pub fn act_name(&self) -> &'static str {
         if self.act == TdAct::TD_ACT_START { "start" } else { "arm" }
@@ -159,7 +159,7 @@ pub fn role_name(role: TdRole) -> String {
 }
 
 impl Model {
-    /// How many people an arming and a start take; `None` without operators.
+    /// How many people must agree to arm and start; `None` without operators.
     pub fn people(&self) -> Option<u8> {
         self.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value.people)
     }
@@ -169,13 +169,13 @@ impl Model {
         self.settings.key_owner.as_ref().map_or(0, |owner| owner.number)
     }
 
-    /// The number of the key of who sits at this screen; 0 for anybody but its owner.
-    pub fn own_number(&self) -> u8 {
+    /// The key number of the operator at this screen; 0 if that is not the key's owner.
+    pub fn operator_number(&self) -> u8 {
         let is_owner = why_not_seat(self, &self.settings.seat).is_none();
         if is_owner || self.settings.seat.screen == 0 { self.key_number() } else { 0 }
     }
 
-    /// The role of an operator, as the vehicle tells it.
+    /// The role of an operator, as the vehicle reports it.
     pub fn role_of(&self, number: u8) -> Option<TdRole> {
         self.vehicle.operators.get(&number).map(|(role, _)| *role)
     }
@@ -188,12 +188,12 @@ impl Model {
         }
     }
 
-    /// The ask that waits.
-    pub fn ask(&self, now: Duration) -> Option<Ask> {
-        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+    /// The proposal that waits.
+    pub fn proposal(&self, now: Duration) -> Option<Proposal> {
+        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= CREW_VALID_FOR)?;
         let left = Duration::from_millis(crew.value.ask_left_ms.into()).saturating_sub(crew.age(now));
         let waits = crew.value.act != TdAct::TD_ACT_NONE && !left.is_zero();
-        waits.then_some(Ask {
+        waits.then_some(Proposal {
             act: crew.value.act,
             number: crew.value.ask_number,
             by: crew.value.asked_by,
@@ -201,23 +201,25 @@ impl Model {
         })
     }
 
-    /// The ask that our operator may confirm.
-    pub fn ask_to_confirm(&self, now: Duration) -> Option<Ask> {
-        let own = self.key_number();
-        let differs = |ask: &Ask| {
-            ask.by != own && self.role_of(own).is_some() && self.role_of(own) != self.role_of(ask.by)
+    /// The proposal that our operator may confirm.
+    pub fn proposal_to_confirm(&self, now: Duration) -> Option<Proposal> {
+        let ours = self.key_number();
+        let differs = |proposal: &Proposal| {
+            proposal.by != ours
+                && self.role_of(ours).is_some()
+                && self.role_of(ours) != self.role_of(proposal.by)
         };
-        self.ask(now).filter(|_| own > 0).filter(differs)
+        self.proposal(now).filter(|_| ours > 0).filter(differs)
     }
 
     /// Who has to tap, and how long is left.
     pub fn tapping(&self, now: Duration) -> Option<(u8, Duration)> {
-        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= TOLD_FOR)?;
+        let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= CREW_VALID_FOR)?;
         let left = Duration::from_millis(crew.value.tap_left_ms.into()).saturating_sub(crew.age(now));
         (crew.value.tapped_by > 0 && self.vehicle.counts_down()).then_some((crew.value.tapped_by, left))
     }
 
-    /// The operator who commands, by the number of their key; `None` if nobody has armed it.
+    /// The operator who commands, by the number of their key; `None` before an arming.
     pub fn commanded_by(&self) -> Option<u8> {
         self.vehicle.last::<TD_CREW_DATA>().map(|crew| crew.value.commanded_by).filter(|number| *number > 0)
     }

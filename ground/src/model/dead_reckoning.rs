@@ -1,8 +1,8 @@
 //! Predicts the position of the vehicle after the link is lost in flight.
 //!
-//! Under thrust the vehicle is assumed to follow its last plan. Otherwise [`LastMotion`] continues
-//! the last known motion, with the drag estimated from the last second's acceleration, the wind,
-//! and the height at which the motor was to be lit.
+//! Under thrust the vehicle is assumed to follow its last plan. Otherwise [`LastMotion`]
+//! extrapolates the last motion, with the drag estimated from the last second's acceleration, the
+//! wind, and the planned ignition height.
 //!
 //! The error circle is meant to contain the vehicle in 19 of 20 cases. It grows with the time `t`
 //! since the last position: errors of position, speed and acceleration add up to `s0 + sv t + sa
@@ -16,7 +16,7 @@ use protocol::dialect::{TdChute, TdHold, TdPhase};
 use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Spot, Vehicle, is_burning};
 
 /// Error of the last position, m: usual for a satellite receiver.
-const POSITION_ERROR_M: f64 = 1.5;
+pub(super) const POSITION_ERROR_M: f64 = 1.5;
 /// Error of the last speed, m/s.
 const SPEED_ERROR_M_S: f64 = 0.5;
 /// Error of the acceleration, m/s2: fins and thrust steer in an unknown direction.
@@ -26,7 +26,7 @@ const OPENING_ERROR_M_S2: f64 = 5.0;
 /// The same while a boost motor of unknown thrust burns.
 const LIFTED_ERROR_M_S2: f64 = 20.0;
 /// Surplus thrust of a burn is directed sideways, in an unknown direction: at most this
-/// acceleration, m/s2, for this time, s. The resulting speed is kept.
+/// acceleration, m/s2, for this time, s. The resulting speed persists.
 const SWERVE_M_S2: f64 = 6.0;
 const SWERVE_S: f64 = 1.0;
 /// A landing is at most this share of the predicted time, plus this time, s, later than predicted.
@@ -47,16 +47,15 @@ pub struct PredictedPosition {
 }
 
 /// The predicted position of a vehicle in flight whose last position is stale. `None` while the
-/// vehicle is heard or on the ground, or if no position in flight is known.
+/// telemetry arrives or the vehicle is on the ground, or if no position in flight is available.
 pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPosition> {
     let motion = vehicle.best_motion()?;
-    if !is_unheard(vehicle, now) {
+    if !is_silent(vehicle, now) {
         return None;
     }
     let phase = vehicle.phase()?.value;
     let on_plan = along_plan(vehicle, phase, now);
-    // A position on the pad says nothing about a flight from apogee; only a boost starts on the
-    // pad.
+    // A position on the pad is irrelevant to a flight from apogee; only a boost starts on the pad.
     let in_flight = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
     if !in_flight && phase != TdPhase::TD_PHASE_BOOST && on_plan.is_none() {
         return None;
@@ -83,19 +82,19 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
 const COURSE_STEP_S: f64 = 0.5;
 const COURSE_LONGEST_S: f64 = 120.0;
 
-/// Where the vehicle is expected to be: moments and positions, to the ground as far as that can be
-/// predicted. On the way up only to apogee: how it falls is not reported yet. Under the ascent
-/// motor, whose thrust is not known, and under a parachute that still fills, nothing. After a loss
-/// of the link it begins at the last report, so that the predicted touchdown stands still.
-pub fn foreseen(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)> {
+/// Predicted times and positions, down to the ground as far as that can be predicted. On the way up
+/// only to apogee: the fall is not reported yet. Empty under the ascent motor, whose thrust is not
+/// reported, and under a parachute that still fills. After a loss of the link it begins at the last
+/// report, so that the predicted touchdown does not move.
+pub fn predicted_course(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)> {
     let (Some(motion), Some(phase)) = (vehicle.best_motion(), vehicle.phase_now()) else { return Vec::new() };
-    let from = if is_unheard(vehicle, now) { motion.received_at } else { now };
-    let left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
-    let untold = match phase {
+    let from = if is_silent(vehicle, now) { motion.received_at } else { now };
+    let has_left_pad = vehicle.left_pad_at.is_some_and(|at| motion.received_at >= at);
+    let unpredictable = match phase {
         TdPhase::TD_PHASE_CHUTE => !is_carried(vehicle),
         _ => matches!(phase, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_DEPLOY),
     };
-    if !vehicle.in_flight() || !left_pad || untold {
+    if !vehicle.in_flight() || !has_left_pad || unpredictable {
         return Vec::new();
     }
     let last = LastMotion::of(vehicle, phase, &motion.value);
@@ -122,19 +121,19 @@ pub fn foreseen(vehicle: &Vehicle, now: Duration) -> Vec<(Duration, NorthEastUp)
     course
 }
 
-/// For how long the vehicle may have been in the air: its countdown ran when it was last heard, and
-/// has reached zero since. A hold or an abort in the silence is not known here.
+/// For how long the vehicle may have been in the air: its countdown ran in the last telemetry, and
+/// has reached zero since. A hold or an abort in the silence is not visible here.
 pub fn may_have_left(vehicle: &Vehicle, now: Duration) -> Option<Duration> {
     let status = vehicle.status.as_ref().filter(|status| status.is_stale(now))?;
     let counted =
         status.value.phase == TdPhase::TD_PHASE_PAD_ARMED && status.value.hold == TdHold::TD_HOLD_NONE;
     let left_s = vehicle.countdown_s().filter(|left| counted && left.value > 0.0)?.value;
-    // Something heard after it may already tell of the flight.
+    // A later message may already report the flight.
     status.age(now).checked_sub(Duration::from_secs_f64(left_s)).filter(|_| vehicle.left_pad_at.is_none())
 }
 
 /// Whether the vehicle is in flight and its position is stale.
-pub fn is_unheard(vehicle: &Vehicle, now: Duration) -> bool {
+pub fn is_silent(vehicle: &Vehicle, now: Duration) -> bool {
     let in_silence = match vehicle.best_motion() {
         Some(motion) => motion.is_stale(now),
         None => vehicle.phase().is_some_and(|phase| phase.is_stale(now)),
@@ -163,8 +162,8 @@ fn swerve_m(burning_s: f64) -> f64 {
     SWERVE_M_S2 * swerving_s * (burning_s - 0.5 * swerving_s)
 }
 
-/// Under thrust, the present position on the plan. Its points are evenly spaced in time, and say
-/// how far north and how high it is. The motion to the east is assumed to stop when the plan ends.
+/// Under thrust, the present position on the plan. Its points are evenly spaced in time and give
+/// north and height. The motion to the east is assumed to stop when the plan ends.
 fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrapolated> {
     let (path, prediction) = (vehicle.path.as_ref()?, vehicle.prediction?);
     let motion = vehicle.best_motion()?;
@@ -193,18 +192,17 @@ fn along_plan(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<Extrap
     })
 }
 
-// Continues the last known motion of the vehicle: falling with drag, braking, or accelerating under
+// Extrapolates the last motion of the vehicle: falling with drag, braking, or accelerating under
 // thrust.
 //
 // A fall has the drag `k V^2` against its motion through the air. `k` is chosen so that drag
 // explains the difference between gravity and the last second's acceleration: at terminal speed the
-// speed is kept, shortly after apogee the vehicle falls freely. Below the height at which the motor
-// was to be lit, a constant deceleration brings the vehicle to rest on the ground.
+// speed is constant, shortly after apogee the vehicle falls freely. Below the planned ignition
+// height, a constant deceleration brings the vehicle to rest on the ground.
 
 /// Below this airspeed, m/s, drag cannot be distinguished from noise.
 const DRAG_SEEN_M_S: f64 = 8.0;
-/// The largest believable drag, 1/m: a terminal speed of 2 m/s, slower than under an open
-/// parachute.
+/// The largest plausible drag, 1/m: a terminal speed of 2 m/s, slower than under an open parachute.
 const DRAG_MAX_PER_M: f64 = GRAVITY_M_S2 / 4.0;
 /// Integration step, s: small against the fastest change, the 0.5 s in which a fall under a
 /// parachute reaches its terminal speed.
@@ -240,7 +238,7 @@ pub(super) struct Extrapolated {
     pub(super) basis: Basis,
 }
 
-/// The last known motion and what acts on it.
+/// The last reported motion and the forces on it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LastMotion {
     at_m: NorthEastUp,
@@ -263,13 +261,13 @@ impl LastMotion {
     /// Collects the last reports of the vehicle.
     pub(super) fn of(vehicle: &Vehicle, phase: TdPhase, motion: &Motion) -> Self {
         // An unknown position stays unknown; an unknown velocity is taken as zero.
-        let known = |value: f64| if value.is_finite() { value } else { 0.0 };
-        let velocity_m_s = [motion.vx_m_s, motion.vy_m_s, motion.climb_m_s].map(known);
+        let finite = |value: f64| if value.is_finite() { value } else { 0.0 };
+        let velocity_m_s = [motion.vx_m_s, motion.vy_m_s, motion.climb_m_s].map(finite);
         let descent = vehicle.descent().map(|descent| descent.value);
         let wind_m_s = descent
             .as_ref()
             .map_or([0.0; 3], |d| [f64::from(d.wind_x_m_s), f64::from(d.wind_y_m_s), 0.0])
-            .map(known);
+            .map(finite);
         let change = vehicle.trend.mean_change();
         let thrust = matches!(phase, TdPhase::TD_PHASE_POWERED | TdPhase::TD_PHASE_BOOST);
         let forces = match change {
@@ -295,8 +293,8 @@ impl LastMotion {
         let (or_else_m, basis) = match self.forces {
             Forces::Thrust { .. } | Forces::Brake => (0.0, Basis::LastThrust),
             Forces::Air { burn_from_m: Some(_), drag_per_m } => {
-                let unlit = Self { forces: Forces::Air { drag_per_m, burn_from_m: None }, ..*self };
-                let fallen = unlit.follow(seconds).0;
+                let without_burn = Self { forces: Forces::Air { drag_per_m, burn_from_m: None }, ..*self };
+                let fallen = without_burn.follow(seconds).0;
                 ((place[2].max(0.0) - fallen[2].max(0.0)).abs(), Basis::FallThenBurn)
             }
             Forces::Air { drag_per_m: Some(_), .. } => (0.0, Basis::Fall),
@@ -305,8 +303,8 @@ impl LastMotion {
         Extrapolated { place, or_else_m, burning_s, landed_after_s, basis }
     }
 
-    /// Place, when it landed, s, and for how long the motor burnt, s. Integrates with the midpoint
-    /// rule: exact for free fall, second order for drag.
+    /// Position, time of landing, s, and burn time, s. Integrates with the midpoint rule: exact for
+    /// free fall, second order for drag.
     fn follow(&self, seconds: f64) -> (NorthEastUp, Option<f64>, f64) {
         let (mut place, mut velocity) = (self.at_m, self.velocity_m_s);
         let mut braking = None;
@@ -327,8 +325,8 @@ impl LastMotion {
             burning_s += if burns { step_s } else { 0.0 };
             // Braked to rest, close to the ground as far as the last values were right; or on the
             // ground.
-            let stands = burns && velocity[2] >= 0.0 && self.velocity_m_s[2] < 0.0;
-            if stands || place[2] <= 0.0 {
+            let is_down = burns && velocity[2] >= 0.0 && self.velocity_m_s[2] < 0.0;
+            if is_down || place[2] <= 0.0 {
                 return (place, Some(passed_s), burning_s);
             }
         }
@@ -341,11 +339,11 @@ impl LastMotion {
         velocity: &NorthEastUp,
         braking: &mut Option<NorthEastUp>,
     ) -> NorthEastUp {
-        let is_lit = |from_m: f64| place[2] <= from_m && velocity[2] < 0.0;
+        let is_ignited = |from_m: f64| place[2] <= from_m && velocity[2] < 0.0;
         match self.forces {
             Forces::Thrust { acceleration_m_s2 } => acceleration_m_s2,
             Forces::Air { drag_per_m, burn_from_m }
-                if braking.is_none() && !burn_from_m.is_some_and(is_lit) =>
+                if braking.is_none() && !burn_from_m.is_some_and(is_ignited) =>
             {
                 let through_air = std::array::from_fn(|axis| velocity[axis] - self.wind_m_s[axis]);
                 let resistance = drag_per_m.unwrap_or(0.0) * size(&through_air);
@@ -358,7 +356,7 @@ impl LastMotion {
 }
 
 /// The drag that explains the difference between acceleration and gravity, 1/m; `None` if the
-/// airspeed is too low to tell.
+/// airspeed is too low to estimate it.
 fn drag_per_m(change: &Change, wind: &NorthEastUp) -> Option<f64> {
     let through_air: NorthEastUp = std::array::from_fn(|axis| change.velocity_m_s[axis] - wind[axis]);
     let speed = size(&through_air);
@@ -366,8 +364,8 @@ fn drag_per_m(change: &Change, wind: &NorthEastUp) -> Option<f64> {
         return None;
     }
     let [north, east, up] = change.acceleration_m_s2;
-    let felt = [north, east, up + GRAVITY_M_S2];
-    let against: f64 = felt.iter().zip(&through_air).map(|(felt, through)| -felt * through).sum();
+    let specific_force = [north, east, up + GRAVITY_M_S2];
+    let against: f64 = specific_force.iter().zip(&through_air).map(|(force, through)| -force * through).sum();
     let drag = against / (speed * speed * speed);
     drag.is_finite().then(|| drag.clamp(0.0, DRAG_MAX_PER_M))
 }
@@ -432,7 +430,7 @@ mod tests {
     }
 
     #[test]
-    fn no_prediction_while_the_vehicle_is_heard_or_landed() {
+    fn no_prediction_while_telemetry_arrives_or_after_landing() {
         assert_eq!(predict_position(&falling_freely(), SEEN + Duration::from_secs(1)), None);
         let landed = moving(TdPhase::TD_PHASE_TOUCHDOWN, [0.0; 3], None);
         assert_eq!(predict_position(&landed, SEEN + Duration::from_secs(9)), None);
@@ -524,13 +522,13 @@ mod tests {
         );
     }
 
-    /// At terminal speed, with the motor to be lit at 50 m: from there, 40 m/s are braked to zero
-    /// in 2.5 s.
+    /// At terminal speed, with ignition planned at 50 m: from there, 40 m/s are braked to zero in
+    /// 2.5 s.
     #[test]
     fn the_planned_burn_brakes_and_the_circle_covers_a_fall_without_it() {
         let mut vehicle = moving(TdPhase::TD_PHASE_LAND_ARMED, [0.0, 0.0, -40.0], Some([0.0; 3]));
         let descent = TD_DESCENT_DATA { chosen_height_m: 50.0, ..TD_DESCENT_DATA::default() };
-        vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
+        vehicle.store(&MavMessage::TD_DESCENT(descent), SEEN);
         let phase = TdPhase::TD_PHASE_LAND_ARMED;
         let mut status = TD_FLIGHT_STATUS_DATA { phase, ..TD_FLIGHT_STATUS_DATA::default() };
         status.interlocks = protocol::dialect::TdInterlock::TD_INTERLOCK_ARMED;
@@ -555,15 +553,15 @@ mod tests {
         let chute = TdChute::TD_CHUTE_OPEN;
         let descent =
             TD_DESCENT_DATA { chute, wind_x_m_s, chosen_height_m: f32::NAN, ..TD_DESCENT_DATA::default() };
-        vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
+        vehicle.store(&MavMessage::TD_DESCENT(descent), SEEN);
         vehicle
     }
 
     /// It sinks as it does and drifts with the wind: 100 m at 6 m/s take 16.7 s, at 7 m/s 14.3 s.
     #[test]
-    fn val_under_its_canopy_it_keeps_its_sink_and_drifts_with_the_wind() {
+    fn val_under_its_canopy_the_sink_is_constant_and_it_drifts_with_the_wind() {
         for (sinks_m_s, wind_m_s) in [(6.0, 5.0_f32), (7.0, -3.0)] {
-            let course = foreseen(&carried(sinks_m_s, wind_m_s), SEEN);
+            let course = predicted_course(&carried(sinks_m_s, wind_m_s), SEEN);
             let (lands_at, [north_m, ..]) = *course.last().expect("a course to the ground");
             let lands_s = lands_at.saturating_sub(SEEN).as_secs_f64();
             assert!((lands_s - 100.0 / sinks_m_s).abs() < 0.5, "{lands_s} s");
@@ -571,20 +569,20 @@ mod tests {
         }
     }
 
-    /// Until the canopy carries it, nobody can tell when it lands.
+    /// Until the canopy carries it, the time of landing is unpredictable.
     #[test]
-    fn before_its_canopy_carries_it_no_course_is_told() {
+    fn no_course_is_predicted_before_the_canopy_carries_it() {
         let mut vehicle = carried(30.0, 0.0);
         let fired = TD_DESCENT_DATA { chute: TdChute::TD_CHUTE_FIRED, ..TD_DESCENT_DATA::default() };
-        vehicle.keep(&MavMessage::TD_DESCENT(fired), SEEN);
-        assert_eq!(foreseen(&vehicle, SEEN), []);
+        vehicle.store(&MavMessage::TD_DESCENT(fired), SEEN);
+        assert_eq!(predicted_course(&vehicle, SEEN), []);
     }
 
     proptest! {
         /// At terminal speed the forces balance: the speed is kept, whatever the speed and the
         /// wind.
         #[test]
-        fn at_terminal_speed_the_speed_is_kept(
+        fn at_terminal_speed_the_speed_is_constant(
             down_m_s in 8.5..60.0_f64,
             wind in prop::array::uniform2(-8.0..8.0_f64),
             seconds in 1.6..3.0_f64,
@@ -594,7 +592,7 @@ mod tests {
             let [wind_x_m_s, wind_y_m_s] = wind.map(|part| part as f32);
             let descent =
                 TD_DESCENT_DATA { wind_x_m_s, wind_y_m_s, chosen_height_m: f32::NAN, ..TD_DESCENT_DATA::default() };
-            vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
+            vehicle.store(&MavMessage::TD_DESCENT(descent), SEEN);
             let found = after(&vehicle, seconds);
             let expected_m = (100.0 - down_m_s * seconds).max(0.0);
             prop_assert!((found.altitude_m - expected_m).abs() < 1e-3, "{found:?}");
@@ -617,7 +615,7 @@ mod tests {
             let phase = crate::model::telemetry::phase_from_number(phase).unwrap();
             let mut vehicle = moving(phase, velocity, acceleration);
             let descent = TD_DESCENT_DATA { chosen_height_m, ..TD_DESCENT_DATA::default() };
-            vehicle.keep(&MavMessage::TD_DESCENT(descent), SEEN);
+            vehicle.store(&MavMessage::TD_DESCENT(descent), SEEN);
             let at = |seconds: f64| predict_position(&vehicle, SEEN + Duration::from_secs_f64(seconds));
             if let (Some(sooner), Some(later)) = (at(seconds), at(seconds + 0.5)) {
                 prop_assert!(later.spot.north_m.is_finite() && later.spot.east_m.is_finite() && later.altitude_m.is_finite());

@@ -1,20 +1,20 @@
-//! What stands between a key and its effect: the dialog that takes the keys (typing a word, or
-//! confirming), the abort chord, and whether the keys were typed by hand.
+//! Confirmation between a key and its effect: the dialog (typing a word, or confirming), the abort
+//! chord, and the test whether the keys were typed by hand.
 
 use std::time::Duration;
 
 use protocol::dialect::TdAct;
 
-use super::{Ask, CommandKind, Request};
+use super::{CommandKind, Proposal, Request};
 use crate::key::Key;
 
-/// How long the crew has to type a word.
+/// Time limit for typing a word.
 pub const WORD_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// How long the crew has for Enter where it confirms alone.
 pub const CONFIRM_TIME_LIMIT: Duration = Duration::from_secs(5);
-/// The word that confirms what another operator asks.
+/// The word that confirms another operator's proposal.
 pub const CONFIRM_WORD: &str = "CONFIRM";
-/// The key that confirms what was completed by keys that arrived faster than a hand types; no text
+/// The key that confirms a dialog completed by keys that arrived faster than a hand types; no text
 /// contains it.
 pub const AGAIN_KEY: Key = Key::CtrlY;
 /// That key counts this long after the question: a paste has no such pause before it, and who reads
@@ -26,22 +26,22 @@ pub const AGAIN_TIME_LIMIT: Duration = Duration::from_secs(10);
 /// long, and then the word until Enter.
 const REST_WITHIN: Duration = Duration::from_secs(1);
 
-/// What the crew is to confirm.
+/// The action to confirm.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Prompt {
     /// The second step of arming.
     Arm,
     /// Start the countdown.
     Start,
-    /// Confirm another operator's ask: that one and no other.
-    Confirm(Ask),
-    /// Go on although the station's log is unfit.
+    /// Confirm another operator's proposal: that one and no other.
+    Confirm(Proposal),
+    /// Continue although the station's log is unfit.
     WithoutLog,
     /// Arm although no burn of the motor's lot has confirmed its curve.
     Untested,
     TakeCommand,
     Disarm,
-    /// Abort a vehicle with another autopilot, after what it would do there was read.
+    /// Abort a vehicle with another autopilot, after the crew has read the effect there.
     AbortForeign,
     /// Hold the countdown.
     Hold,
@@ -49,7 +49,7 @@ pub enum Prompt {
     Check {
         moves: bool,
     },
-    /// Say that every surface moved as it should.
+    /// Confirm that every surface moved as it should.
     Seen,
     /// Sign a step of the checklist, counted from zero, or take its signature back.
     Sign {
@@ -64,26 +64,26 @@ impl Prompt {
     /// Opens the dialog.
     pub fn open(self, now: Duration) -> Dialog {
         let limit = match self {
-            Self::Confirm(ask) => ask.left,
+            Self::Confirm(proposal) => proposal.left,
             _ if self.word().is_some() => WORD_TIME_LIMIT,
             _ => CONFIRM_TIME_LIMIT,
         };
         Dialog { prompt: self, typed: String::new(), until: now + limit, again_from: None }
     }
 
-    /// Whether it acts only on keys that were typed by hand, or else asks again. Whatever stops
-    /// something acts at once.
+    /// Whether it acts only on keys typed by hand, and otherwise needs another confirmation.
+    /// Anything that stops something acts immediately.
     pub fn needs_a_hand(self) -> bool {
         !matches!(self, Self::Hold | Self::Disarm | Self::AbortForeign)
     }
 
-    /// Its name for the list of events, the word to type, and what it asks for once it is complete.
+    /// Its name for the list of events, the word to type, and its request once it is complete.
     fn row(self) -> (&'static str, Option<&'static str>, Option<Request>) {
         let command = |kind| Some(Request::Command(kind));
         match self {
             Self::Arm => ("arming", Some("ARM"), command(CommandKind::Arm)),
             Self::Start => ("start", Some("START"), command(CommandKind::Start)),
-            Self::Confirm(Ask { act: TdAct::TD_ACT_START, .. }) => {
+            Self::Confirm(Proposal { act: TdAct::TD_ACT_START, .. }) => {
                 ("confirmation", Some(CONFIRM_WORD), command(CommandKind::ConfirmStart))
             }
             Self::Confirm(_) => ("confirmation", Some(CONFIRM_WORD), command(CommandKind::ConfirmArm)),
@@ -113,14 +113,14 @@ impl Prompt {
         self.row().1
     }
 
-    /// What it asks for once it is complete; `None` for what concerns this screen alone.
+    /// Its request once it is complete; `None` if it concerns this screen alone.
     pub fn request(self) -> Option<Request> {
         self.row().2
     }
 }
 
 /// The open dialog. It accepts the next letter of its word (in either case), or Enter after the
-/// whole word. Any other key closes it. The abort chord works in every dialog.
+/// complete word. Any other key closes it. The abort chord works in every dialog.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dialog {
     pub prompt: Prompt,
@@ -161,19 +161,19 @@ impl Dialog {
     }
 }
 
-/// What is left of a typed word whose dialog did not open, or has closed: the crew types on, and no
+/// The rest of a typed word whose dialog did not open, or has closed: the crew types on, and no
 /// letter of it may act as a key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RestOfWord {
     /// The words that the crew may be typing, and how many of their letters have passed.
     words: Vec<(&'static str, usize)>,
-    /// Why nothing is done; it is said again after the word.
+    /// Why nothing is done; it is repeated after the word.
     pub why: String,
     until: Duration,
 }
 
 impl RestOfWord {
-    /// The word of a dialog that did not open, or the one that confirms what a second person asks.
+    /// The word of a dialog that did not open, or the one that confirms a second person's proposal.
     /// The key of a take-over is the first letter of that one.
     pub fn refused(prompt: Prompt, why: String, now: Duration) -> Self {
         let passed = usize::from(prompt == Prompt::TakeCommand);
@@ -186,7 +186,7 @@ impl RestOfWord {
         let word = dialog.word()?;
         let typed = dialog.typed.len();
         let mut words = vec![(word, typed.max(1))];
-        // The crew may have meant the other word of the same key.
+        // The crew may have intended the other word of the same key.
         let passed = usize::from(dialog.prompt == Prompt::TakeCommand);
         let rest = &CONFIRM_WORD[passed..];
         let other = wrong.filter(|letter| typed == 0 && rest.starts_with(letter.to_ascii_uppercase()));
@@ -227,7 +227,7 @@ impl RestOfWord {
 
 /// How long the second key may take, from the first press or from the end of its hold.
 pub const ABORT_TIME_LIMIT: Duration = Duration::from_secs(2);
-/// An Enter that comes this soon after Ctrl-X, and after that time, was meant for it.
+/// An Enter within this time of Ctrl-X, but after its time limit, was intended for the abort.
 const LATE_WITHIN: Duration = Duration::from_secs(10);
 /// Presses closer together than this are repeats of a held key: keyboards repeat every 20 to 100
 /// ms, fingers are slower. A second press also waits this long to show that it is no repeat.
@@ -265,7 +265,7 @@ impl AbortChord {
             Self::Once(at) if now.saturating_sub(at) >= REPEATS_WITHIN && self.is_begun(now) => {
                 Self::Twice(now)
             }
-            // The ground was too busy to act in time, so nobody knows when this key was pressed.
+            // The ground was too busy to act in time, so the time of this key press is unknown.
             Self::Twice(at) if now.saturating_sub(at) >= REPEATS_WITHIN => Self::Twice(now),
             // The first press, or a repeat of a held key.
             Self::Open | Self::Once(_) | Self::Twice(_) => Self::Once(now),
@@ -292,7 +292,7 @@ impl AbortChord {
         complete
     }
 
-    /// A key came that means something else: an Enter after it is none that came late.
+    /// A key with another meaning was pressed: an Enter after it is not a late one.
     pub fn forget_if_over(&mut self, now: Duration) {
         if !self.is_begun(now) {
             *self = Self::Open;
@@ -304,19 +304,19 @@ impl AbortChord {
         self.acts_at().is_some_and(|at| now >= at) && self.end()
     }
 
-    /// Enter was pressed: whether it came too late, a moment after the question had run out. It is
-    /// asked once.
+    /// Enter was pressed: returns whether it came too late, shortly after the time limit. Only the
+    /// first call returns true.
     pub fn take_late_enter(&mut self, now: Duration) -> bool {
         matches!(std::mem::take(self), Self::Once(at) if now.saturating_sub(at) <= LATE_WITHIN)
     }
 }
 
-// Tells from their timing whether keys were typed, repeated by a held key, or arrived faster than a
-// hand types.
+// Distinguishes by their timing keys that were typed, repeated by a held key, or arrived faster
+// than a hand types.
 //
 // Keys that arrive too fast may be a paste, but also typed keys that a slow connection delivered in
-// bunches. So they only show and prepare; what they complete is asked again ([`Dialog::again`]).
-// The keys of the abort count in every case.
+// bunches. So they only show and prepare; what they complete needs another confirmation
+// ([`Dialog::again`]). The keys of the abort count in every case.
 
 /// Different keys closer together than this were not typed by hand. Two fingers are about 40 ms
 /// apart; pasted text arrives at 1 ms a letter on a serial console at 9,600 baud, 8 ms at 1,200

@@ -69,8 +69,8 @@ impl Trace {
 /// Adds a row with the present values, if one is due, and notes the silence in flight.
 pub(crate) fn note_trace(model: &mut Model, now: Duration) {
     let in_flight = model.vehicle.phase_now().is_some_and(is_flight);
-    if let Some(heard_at) = model.link.heard_at.filter(|_| in_flight) {
-        model.history.silence = model.history.silence.max(now.saturating_sub(heard_at));
+    if let Some(last_frame_at) = model.link.last_frame_at.filter(|_| in_flight) {
+        model.history.silence = model.history.silence.max(now.saturating_sub(last_frame_at));
     }
     if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
         return;
@@ -87,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_trace_stays_bounded_and_keeps_the_recent_past_in_full() {
+    fn the_trace_is_bounded_and_the_recent_past_complete() {
         let mut trace = Trace::default();
         let height = Quantity::named("height").unwrap();
         for second in 0..20_000_u32 {

@@ -1,5 +1,5 @@
-//! Which vehicle is heard: which of its boots, whether it is simulated, whether it is one of ours
-//! at all.
+//! Identity of the received vehicle: its boot, whether it is simulated, and whether it is one of
+//! ours at all.
 
 use std::num::NonZeroU32;
 use std::time::Duration;
@@ -10,7 +10,7 @@ pub use protocol::reported::may_be_ours;
 
 use super::{Model, Sample, words};
 
-/// What a vehicle tells of itself and its boot.
+/// The vehicle's report of its boot, and whether it is simulated.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Boot {
     number: Option<NonZeroU32>,
@@ -40,12 +40,12 @@ impl Boot {
     }
 
     /// Whether both flags have been received since the boot number was.
-    pub fn has_said_what_it_is(&self) -> bool {
+    pub fn is_identified(&self) -> bool {
         self.hil.is_some() && self.flagged.is_some()
     }
 
     /// Takes a message of this boot.
-    pub fn hear(&mut self, message: &MavMessage) {
+    pub fn note(&mut self, message: &MavMessage) {
         match message {
             MavMessage::HEARTBEAT(beat) => {
                 let set = beat.base_mode.contains(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED);
@@ -81,15 +81,15 @@ pub(crate) fn time_boot_ms(message: &MavMessage) -> Option<u32> {
     }
 }
 
-/// A vehicle of ours sends its status at least once a second, on any line. For so long it may be
-/// lost.
+/// How long the status of one of our vehicles may be lost; it is sent at least once a second, on
+/// any line.
 const NO_STATUS_FOR: Duration = Duration::from_secs(3);
 /// A vehicle with another version of the dialect sends more frames that do not fit in that time.
 const MISFITS: u64 = 10;
 
 impl Model {
-    /// Whether the vehicle beats as one of ours, but what it says fits no message of this
-    /// station's: the other has another version of the dialect.
+    /// Whether the heartbeat is that of one of our vehicles, but its messages do not fit this
+    /// station's dialect: the two have different versions.
     pub fn speaks_another_version(&self, now: Duration) -> bool {
         let link = &self.link;
         let misfits = link.framing.crc_errors + link.framing.unknown_ids + link.undecodable;
@@ -101,8 +101,8 @@ impl Model {
     }
 }
 
-// A vehicle with another autopilot: it is shown as what its heartbeat says, and never armed or
-// started from here.
+// A vehicle with another autopilot: it is shown by its heartbeat's type, and never armed or started
+// from here.
 
 /// Autopilot and type of another make, as in `ArduPilot quadrotor`.
 pub fn foreign_name(beat: &Sample<HEARTBEAT_DATA>) -> String {
@@ -114,7 +114,7 @@ pub fn foreign_name(beat: &Sample<HEARTBEAT_DATA>) -> String {
     format!("{autopilot} {}", words::lower_case(&beat.value.mavtype, "MAV_TYPE_"))
 }
 
-/// What `MAV_CMD_DO_FLIGHTTERMINATION` does to a vehicle of another make.
+/// Effect of `MAV_CMD_DO_FLIGHTTERMINATION` on a vehicle with another autopilot.
 pub const TERMINATION: &str = "CUTS ITS MOTORS, or does as set there: it falls";
 
 #[cfg(test)]
@@ -142,7 +142,7 @@ mod boot_tests {
         let of = |heard: &[MavMessage]| {
             let mut boot = Boot::default();
             for message in heard {
-                boot.hear(message);
+                boot.note(message);
             }
             boot.is_simulated()
         };
@@ -165,7 +165,7 @@ mod foreign_tests {
     }
 
     #[test]
-    fn only_the_heartbeat_of_a_rocket_without_a_known_autopilot_may_be_ours() {
+    fn only_the_heartbeat_of_a_rocket_with_a_generic_autopilot_may_be_ours() {
         use {MavAutopilot as A, MavType as T};
         assert!(may_be_ours(&beat(A::MAV_AUTOPILOT_GENERIC, T::MAV_TYPE_ROCKET, 0)));
         assert!(!may_be_ours(&beat(A::MAV_AUTOPILOT_ARDUPILOTMEGA, T::MAV_TYPE_ROCKET, 0)));

@@ -1,5 +1,5 @@
-//! The link to the vehicle in both directions: what it carries, what was rejected, when the vehicle
-//! was heard, and whether it hears us.
+//! The link to the vehicle in both directions: rates, rejected frames, time of the last frame, and
+//! whether the vehicle receives this station.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -16,12 +16,11 @@ use super::{Model, Role, time_boot_ms};
 /// How long a radio's last report about itself is shown.
 pub const RADIO_FRESH: Duration = Duration::from_secs(5);
 
-/// Nothing is armed or started for this long after another station was heard under our address.
+/// How long arming and starting are refused after a frame of another station under our address.
 const SAME_ID_FOR: Duration = Duration::from_secs(10);
 
-/// An attached screen that got nothing for longer than this has a silent station: twenty of its
-/// ticks. Less than the silence after which a vehicle is lost, so that the two are not mistaken for
-/// each other.
+/// Silence after which an attached screen reports its station as silent: twenty of its ticks. Less
+/// than the silence after which a vehicle is lost, so that the two are not mistaken for each other.
 const STATION_SILENT_AFTER: Duration = Duration::from_secs(2);
 
 /// The state of one of several links.
@@ -53,12 +52,12 @@ pub struct Link {
     pub signing: Option<SigningCounters>,
     /// When a frame was last refused for its signature.
     pub(crate) refused_at: Option<Duration>,
-    /// It was reported that nothing is heard.
-    pub(crate) unheard_reported: bool,
-    /// The last report of a radio about itself, and its time. It says nothing about the vehicle.
+    /// The hints for a link without data were reported.
+    pub(crate) hints_reported: bool,
+    /// The last report of a radio about itself, and its time. It is no evidence of the vehicle.
     pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
     /// The number of the link that brought the last frame, if there are several.
-    pub(crate) heard_over: Option<usize>,
+    pub(crate) received_over: Option<usize>,
     /// From where the last frame came: a number for each link and address.
     pub(crate) source: u16,
     /// What the framer rejected.
@@ -69,46 +68,45 @@ pub struct Link {
     pub send_drops: u64,
     /// Why no link works, if none does.
     pub trouble: Option<String>,
-    /// The crew has asked for an abort that reached no station. The screen sends it to the next
+    /// The crew has requested an abort that reached no station. The screen sends it to the next
     /// station that it finds.
     pub abort_unsent: bool,
-    /// When this attached screen has asked its station for an abort that the station has not taken
-    /// yet.
-    pub abort_asked_at: Option<Duration>,
+    /// When this attached screen has requested an abort that its station has not accepted yet.
+    pub abort_requested_at: Option<Duration>,
     /// On an attached screen: the last tick of its station. `None` in the station itself.
     pub(crate) station_at: Option<Duration>,
     /// On an attached screen: its station has ended. The screen shows the past, and commands
     /// nothing.
-    pub(crate) station_gone: bool,
+    pub(crate) station_lost: bool,
     /// The first heartbeat of the vehicle.
     pub first_heartbeat_at: Option<Duration>,
     /// The last frame of the vehicle, of any kind.
-    pub heard_at: Option<Duration>,
-    /// How old what the vehicle says is when it arrives.
+    pub last_frame_at: Option<Duration>,
+    /// Age of the vehicle's messages when they arrive.
     pub(crate) content: ContentAge,
-    /// Whether the vehicle hears this station.
+    /// Whether the vehicle receives this station.
     pub uplink: Uplink,
-    /// The stamps of the last TIMESYNC questions, ns.
-    pub(crate) asked: VecDeque<i64>,
+    /// The stamps of the last TIMESYNC requests, ns.
+    pub(crate) timesync_stamps: VecDeque<i64>,
     /// The round-trip time, measured with TIMESYNC.
     pub round_trip: Option<Duration>,
-    /// Since when the vehicle has been heard without a loss of the link.
+    /// Since when the downlink has been alive without a loss.
     pub(crate) alive_since: Option<Duration>,
     pub(crate) loss_reported: bool,
-    /// When another station was last heard under our address.
+    /// When a frame of another station under our address last arrived.
     pub(crate) same_id_at: Option<Duration>,
     pub(crate) strangers: Vec<Address>,
 }
 
 impl Link {
     /// The name of the link that brought the last frame, if there are several.
-    pub fn heard_over(&self) -> Option<&str> {
-        let report = self.heard_over.and_then(|number| self.reports.get(number));
+    pub fn received_over(&self) -> Option<&str> {
+        let report = self.received_over.and_then(|number| self.reports.get(number));
         report.map(|report| report.name.as_str())
     }
 
-    /// Whether another station uses our address, or has used it a moment ago: it may be the one
-    /// that the vehicle obeys.
+    /// Whether another station uses our address, or has used it recently: the vehicle may obey that
+    /// one.
     pub fn shares_our_id(&self, now: Duration) -> bool {
         self.same_id_at.is_some_and(|at| now.saturating_sub(at) < SAME_ID_FOR)
     }
@@ -116,33 +114,32 @@ impl Link {
     /// How long the station of this attached screen has been silent, if it is.
     pub fn station_silence(&self, now: Duration) -> Option<Duration> {
         let silence = now.saturating_sub(self.station_at?);
-        (silence > STATION_SILENT_AFTER && !self.station_gone).then_some(silence)
+        (silence > STATION_SILENT_AFTER && !self.station_lost).then_some(silence)
     }
 
-    /// Why an abort that was asked for is not sent, and what becomes of it.
+    /// Why a requested abort is not sent, and what follows.
     pub fn why_abort_not_sent(&self, now: Duration) -> Option<&'static str> {
         if self.abort_unsent {
             return Some("no station. The next one sends it; Esc cancels it");
         }
-        let hangs = self.abort_asked_at.is_some() && self.station_silence(now).is_some();
-        hangs.then_some("the station hangs; it sends it when it goes on")
+        let hangs = self.abort_requested_at.is_some() && self.station_silence(now).is_some();
+        hangs.then_some("the station hangs; it sends it when it resumes")
     }
 
-    /// How long ago it was last heard, if it has ended.
-    pub fn station_gone_for(&self, now: Duration) -> Option<Duration> {
-        self.station_gone.then(|| now.saturating_sub(self.station_at.unwrap_or(now)))
+    /// Time since the station's last tick, if it has ended.
+    pub fn station_lost_for(&self, now: Duration) -> Option<Duration> {
+        self.station_lost.then(|| now.saturating_sub(self.station_at.unwrap_or(now)))
     }
 
-    /// Until when it is known what the station hears: in an attached screen its last tick,
-    /// otherwise now.
-    pub(crate) fn known_until(&self, now: Duration) -> Duration {
+    /// Until when the station's data are current: in an attached screen its last tick, otherwise
+    /// now.
+    pub(crate) fn valid_until(&self, now: Duration) -> Duration {
         self.station_at.map_or(now, |at| at.min(now))
     }
 
-    /// The state of the downlink: whether the vehicle is heard. It counts as a vehicle from its
-    /// first heartbeat.
+    /// The state of the downlink. It counts as a vehicle from its first heartbeat.
     pub fn state(&self, now: Duration) -> LinkState {
-        LinkState::of(self.first_heartbeat_at.and(self.heard_at), now)
+        LinkState::of(self.first_heartbeat_at.and(self.last_frame_at), now)
     }
 
     /// Takes the time on the vehicle's clock that a message carries.
@@ -153,11 +150,11 @@ impl Link {
         }
     }
 
-    /// The downlink as the header shows it: by the age of what the vehicle has said last, which may
-    /// have waited in a queue.
+    /// The downlink as the header shows it: by the age of the newest content, which may have waited
+    /// in a queue.
     pub fn down(&self, now: Duration) -> LinkState {
         let content = self.content.age(now).map(|age| now.saturating_sub(age));
-        let last = self.first_heartbeat_at.and(self.heard_at);
+        let last = self.first_heartbeat_at.and(self.last_frame_at);
         LinkState::of(last.map(|at| content.unwrap_or(at).min(at)), now)
     }
 
@@ -179,7 +176,7 @@ pub const RED_AFTER: Duration = Duration::from_secs(3);
 /// itself do not count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkState {
-    NeverHeard,
+    NeverReceived,
     Alive(Duration),
     Doubtful(Duration),
     Lost(Duration),
@@ -188,7 +185,7 @@ pub enum LinkState {
 impl LinkState {
     /// The state that follows from the time of the last frame.
     pub fn of(last_at: Option<Duration>, now: Duration) -> Self {
-        let Some(at) = last_at else { return Self::NeverHeard };
+        let Some(at) = last_at else { return Self::NeverReceived };
         let age = now.saturating_sub(at);
         if age > RED_AFTER {
             Self::Lost(age)
@@ -205,9 +202,9 @@ impl LinkState {
     }
 }
 
-// Whether the vehicle hears this station. Hearing the vehicle does not prove it.
+// Whether the vehicle receives this station. Receiving the vehicle does not prove it.
 
-/// How long a proof of the uplink is valid: the vehicle must have heard the station that arms it
+/// How long a proof of the uplink is valid: the vehicle must have received the arming station
 /// within this time.
 pub const PROVEN_WITHIN: Duration = Duration::from_secs(2);
 
@@ -246,30 +243,30 @@ pub struct Uplink {
 impl Uplink {
     /// Takes a report about this station, or about no station because the vehicle has accepted
     /// nothing yet.
-    pub(crate) fn hear(&mut self, told: &TD_UPLINK_DATA, now: Duration) {
+    pub(crate) fn on_report(&mut self, report: &TD_UPLINK_DATA, now: Duration) {
         let ago = |age_ms: u16| {
             (age_ms != u16::MAX).then(|| now.saturating_sub(Duration::from_millis(age_ms.into())))
         };
         self.is_reported = true;
-        self.accepted_at = ago(told.accepted_age_ms);
-        self.armed_by_us = told.commands == 1;
+        self.accepted_at = ago(report.accepted_age_ms);
+        self.armed_by_us = report.commands == 1;
         if self.armed_by_us {
             self.armed_by_other = None;
         }
-        self.refused = ago(told.refused_age_ms).map(|at| Refused {
-            why: told.refusal,
-            source: Address { system_id: told.refused_system, component_id: told.refused_component },
+        self.refused = ago(report.refused_age_ms).map(|at| Refused {
+            why: report.refusal,
+            source: Address { system_id: report.refused_system, component_id: report.refused_component },
             at,
-            count: told.refused_count,
+            count: report.refused_count,
         });
     }
 
     /// Takes a report about another station.
-    pub(crate) fn overhear(&mut self, told: &TD_UPLINK_DATA) {
-        let station = Address { system_id: told.target_system, component_id: told.target_component };
-        if told.commands == 1 {
-            (self.armed_by_other, self.other_session) = (Some(station), told.session);
-        } else if self.armed_by_other == Some(station) && self.other_session == told.session {
+    pub(crate) fn on_other_report(&mut self, report: &TD_UPLINK_DATA) {
+        let station = Address { system_id: report.target_system, component_id: report.target_component };
+        if report.commands == 1 {
+            (self.armed_by_other, self.other_session) = (Some(station), report.session);
+        } else if self.armed_by_other == Some(station) && self.other_session == report.session {
             self.armed_by_other = None;
         }
     }
@@ -281,22 +278,22 @@ impl Uplink {
     }
 
     /// A TIMESYNC that was sent at this time was answered.
-    pub(crate) fn answered(&mut self, asked_at: Duration) {
-        self.answered_at = self.answered_at.max(Some(asked_at));
+    pub(crate) fn answered(&mut self, requested_at: Duration) {
+        self.answered_at = self.answered_at.max(Some(requested_at));
     }
 
-    /// The state of the uplink: whether the vehicle hears this station.
+    /// The state of the uplink.
     pub fn state(&self, now: Duration) -> LinkState {
         LinkState::of(if self.is_reported { self.accepted_at } else { self.answered_at }, now)
     }
 
-    /// Whether it is proven that the vehicle hears this station.
+    /// Whether it is proven that the vehicle receives this station.
     pub fn is_proven(&self, now: Duration) -> bool {
         matches!(self.state(now), LinkState::Alive(age) | LinkState::Doubtful(age) if age <= PROVEN_WITHIN)
     }
 
-    /// Why the vehicle does not hear this station, as far as it reports.
-    pub fn why_unheard(&self) -> String {
+    /// Why the vehicle does not receive this station, as far as it reports.
+    pub fn why_not_received(&self) -> String {
         let Some(refused) = self.refused else { return "it reports no frame".to_owned() };
         let Address { system_id, component_id } = refused.source;
         format!("it refuses frames of {system_id}/{component_id}: {}", refusal(refused.why))
@@ -314,30 +311,30 @@ pub fn refusal(why: TdFrameRefusal) -> &'static str {
     }
 }
 
-// What to say while the vehicle has never been heard, and while frames are refused for their
-// signature.
+// Hints while no telemetry has ever arrived, and while frames are refused for their signature.
 
 /// A vehicle that is switched on sends a HEARTBEAT every second.
 pub const HINTS_AFTER: Duration = Duration::from_secs(5);
 /// Refused frames raise an alarm for this long after the last of them.
 const REFUSED_SHOWN: Duration = Duration::from_secs(5);
 
-/// What to check, the most likely first; `None` once the vehicle was heard, and in the first
+/// What to check, the most likely first; `None` once telemetry has arrived, and in the first
 /// seconds.
-pub fn unheard_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
+pub fn link_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
     let live = model.settings.role != Role::Replaying && model.link.station_silence(now).is_none();
-    if !live || now < HINTS_AFTER || model.link.state(now) != LinkState::NeverHeard {
+    if !live || now < HINTS_AFTER || model.link.state(now) != LinkState::NeverReceived {
         return None;
     }
     let id = model.settings.vehicle.system_id;
     let link = &model.settings.link_name;
     let framing = &model.link.framing;
-    let mut hints = vec![format!("Nothing heard from system {id} for {} s on {link}.", now.as_secs())];
+    let mut hints = vec![format!("Nothing received from system {id} for {} s on {link}.", now.as_secs())];
     hints.extend(model.link.trouble.as_ref().map(|why| format!("The link does not work: {why}.")));
     hints.extend(refused_frames(model, now));
     let others: Vec<String> = model.link.strangers.iter().map(|other| other.system_id.to_string()).collect();
     if !others.is_empty() {
-        hints.push(format!("Heard instead: system {}. Choose it with --vehicle-sysid.", others.join(", ")));
+        hints
+            .push(format!("Received instead: system {}. Choose it with --vehicle-sysid.", others.join(", ")));
     } else if framing.frames == 0 && framing.garbage_bytes > 0 {
         hints.push("Bytes come, but no MAVLink: is the baud rate right?".to_owned());
     }
@@ -346,7 +343,7 @@ pub fn unheard_hints(model: &Model, now: Duration) -> Option<Vec<String>> {
     Some(hints)
 }
 
-/// What the station does on its link, and so what the other end has to do.
+/// The station's part of the link, and so what the other end has to do.
 fn what_the_link_does(link: &str) -> String {
     let (kind, rest) = link.split_once(':').unwrap_or((link, ""));
     match kind {
@@ -358,8 +355,7 @@ fn what_the_link_does(link: &str) -> String {
     }
 }
 
-/// How many frames were refused for their signature, while that goes on and the vehicle is not
-/// heard.
+/// How many frames were refused for their signature, while that continues and no telemetry arrives.
 pub fn refused_frames(model: &Model, now: Duration) -> Option<String> {
     let goes_on = now.saturating_sub(model.link.refused_at?) < REFUSED_SHOWN;
     let counts: SigningCounters =

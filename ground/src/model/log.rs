@@ -1,4 +1,4 @@
-//! What is recorded: the station's log as a check of its own, the events, and the end of the book.
+//! The recording: the station's log as an arming check, the events, and the end of the book.
 //!
 //! Without a log a launch has no record, no book and no place of the vehicle.
 
@@ -19,7 +19,7 @@ const SPACE_MIN_BYTES: u64 = 64 << 20;
 const TIME_MIN: Duration = Duration::from_mins(15);
 /// From this many times either on the crew is warned.
 const WARNED_TIMES: u32 = 4;
-/// A vehicle that was heard, and is not for so long, was switched off.
+/// Silence after which a vehicle counts as switched off.
 const SILENT_FOR: Duration = Duration::from_mins(10);
 /// A log that has lost records counts as unfit for this long.
 const LOSES_FOR: Duration = Duration::from_secs(30);
@@ -30,7 +30,7 @@ pub struct LogHealth {
     /// Records dropped because the queue was full.
     pub dropped: u64,
     pub failed: bool,
-    /// Somebody has removed its files.
+    /// Its files have been removed.
     pub removed: bool,
     /// `None` if it is not known.
     pub space: Option<LogSpace>,
@@ -69,7 +69,7 @@ pub enum LogFault {
     Full,
 }
 
-/// How the station's log stands.
+/// The state of the station's log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LogStanding {
     /// Nothing is recorded, as the crew has chosen (`--log none`), or there is nothing to record.
@@ -82,7 +82,7 @@ pub enum LogStanding {
 }
 
 impl Model {
-    /// How the station's log stands. On an attached screen: that of its station.
+    /// The state of the station's log. On an attached screen: that of its station.
     pub fn station_log(&self, now: Duration) -> LogStanding {
         if self.settings.log_path.is_none() || self.playing.is_some() {
             return LogStanding::None;
@@ -101,11 +101,11 @@ impl Model {
     }
 
     /// Whether the station may end its log and begin another: the vehicle is disarmed on the pad,
-    /// or nothing is heard, and no vehicle that was heard flies or is about to.
+    /// or silent, and no received vehicle flies or is about to.
     pub fn may_change_log(&self, now: Duration) -> bool {
         let rests = |of: &Vehicle| !of.is_armed() && !of.in_flight() && !of.counts_down();
         let is_silent = match self.link.state(now) {
-            LinkState::NeverHeard => true,
+            LinkState::NeverReceived => true,
             LinkState::Lost(silence) => silence >= SILENT_FOR,
             LinkState::Alive(_) | LinkState::Doubtful(_) => false,
         };
@@ -118,7 +118,7 @@ impl Model {
         is_a_station && all_rest && !self.commands.is_aborting() && (is_silent || stands)
     }
 
-    /// Why nothing is armed or started from here; `None` if the log is fit, or if the crew goes on
+    /// Why the station refuses to arm and start; `None` if the log is fit, or if the crew continues
     /// without it.
     pub fn why_no_log(&self, now: Duration) -> Option<String> {
         self.unfit_log(now).map(|(_, words)| format!("station log {words}"))
@@ -133,14 +133,14 @@ impl Model {
     }
 }
 
-// The list of events for the crew; only the newest are kept.
+// The list of events for the crew; only the newest are stored.
 
-/// How many events are kept; older ones are in the log.
-const KEPT: usize = 500;
+/// Number of stored events; older ones are in the log.
+const EVENTS_MAX: usize = 500;
 /// The longest text, in characters; the raw frames in the log hold all of it.
 const TEXT_LEN_MAX: usize = 400;
 
-/// Who reports an event.
+/// The source of an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Display)]
 #[strum(serialize_all = "lowercase")]
 pub enum Speaker {
@@ -154,7 +154,7 @@ pub enum Speaker {
 pub struct Event {
     /// Since the start of the run.
     pub at: Duration,
-    /// Who reports an event.
+    /// The source of an event.
     pub speaker: Speaker,
     pub level: EventLevel,
     /// Safe to print on a terminal.
@@ -175,7 +175,7 @@ impl Event {
 /// The latest events.
 #[derive(Debug, Clone, Default)]
 pub struct Events {
-    kept: VecDeque<Event>,
+    list: VecDeque<Event>,
     total: u64,
 }
 
@@ -185,10 +185,10 @@ impl Events {
         if let Some((cut, _)) = text.char_indices().nth(TEXT_LEN_MAX) {
             text.truncate(cut);
         }
-        if self.kept.len() == KEPT {
-            self.kept.pop_front();
+        if self.list.len() == EVENTS_MAX {
+            self.list.pop_front();
         }
-        self.kept.push_back(Event { at, speaker, level, text });
+        self.list.push_back(Event { at, speaker, level, text });
         self.total += 1;
     }
 
@@ -199,17 +199,17 @@ impl Events {
 
     /// The newest `count` events, oldest first.
     pub fn newest(&self, count: usize) -> impl DoubleEndedIterator<Item = &Event> {
-        self.kept.iter().skip(self.kept.len().saturating_sub(count))
+        self.list.iter().skip(self.list.len().saturating_sub(count))
     }
 
-    /// The events after the first `seen`, as far as they are still kept.
+    /// The events after the first `seen`, as far as they are still stored.
     pub fn since(&self, seen: u64) -> impl Iterator<Item = &Event> {
         let new = usize::try_from(self.total.saturating_sub(seen)).unwrap_or(usize::MAX);
         self.newest(new)
     }
 }
 
-// The end of the station's book, and how much of it the vehicle keeps.
+// The end of the station's book, and how much of it the vehicle has stored.
 
 /// The end of the book, as the station last signed it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -218,8 +218,8 @@ pub struct BookState {
     pub head: Option<SignedHead>,
     /// Whether the station has a key to sign with.
     pub is_signed: bool,
-    /// How many entries the vehicle has confirmed to keep the end of.
-    pub kept: u32,
+    /// Number of entries whose end the vehicle has confirmed.
+    pub confirmed: u32,
     /// When the end was last sent to the vehicle.
     pub(crate) sent_at: Option<Duration>,
 }

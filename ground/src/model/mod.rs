@@ -1,4 +1,4 @@
-//! Everything that the ground knows, as plain data.
+//! The complete state of the ground station, as plain data.
 //!
 //! Every received value carries the time of its reception. The model decides nothing, and it
 //! imports neither `update` nor `view`.
@@ -69,7 +69,7 @@ pub struct Settings {
     pub link_name: String,
     /// The capacity of the link, bytes per second; `None` if no bound is known.
     pub link_capacity_bytes_s: Option<u32>,
-    /// The name of the profile that flies, if it is known beforehand.
+    /// The name of the profile that flies, if it is given beforehand.
     #[serde(skip)]
     pub vehicle_name: Option<String>,
     /// `None` without a log.
@@ -89,14 +89,14 @@ pub struct Settings {
     /// The operator whose key signs what the station sends; `None` without a crew, and for an
     /// observer.
     pub key_owner: Option<KeyOwner>,
-    /// The mission that the vehicle should fly, if the station knows it.
+    /// The mission that the vehicle should fly, if it is given.
     pub mission: Option<MissionHash>,
-    /// Where that flight should begin: pad, apogee or drone; `None` if nobody has said it.
+    /// Where that flight should begin: pad, apogee or drone; `None` if not given.
     pub start: Option<String>,
     /// The people of the crew file by name, with their roles; empty without one.
     #[serde(skip)]
     pub crew_roles: Vec<(String, TdRole)>,
-    /// Where the station is on the Earth; `None` if nobody has said it.
+    /// The station's position on the Earth; `None` if not given.
     #[serde(skip)]
     pub here: Option<Degrees>,
     /// When the run started: seconds since 1970, UTC.
@@ -109,7 +109,7 @@ pub struct Settings {
     /// Whether a person watches a screen; then the end of the flight does not end the program.
     #[serde(skip)]
     pub interactive: bool,
-    /// What is called out, and how.
+    /// Settings for callouts.
     #[serde(skip)]
     pub talk: Talk,
     /// Without a screen: give up if the flight has not ended after this time.
@@ -173,13 +173,13 @@ pub(crate) struct Due {
     pub(crate) telemetry_record: Duration,
 }
 
-/// Everything that the ground knows.
+/// The complete state of the ground station.
 #[derive(Debug, Default)]
 pub struct Model {
     pub settings: Settings,
     /// The vehicle, as its telemetry shows it.
     pub vehicle: Vehicle,
-    /// Which boots of which vehicles are heard.
+    /// The boots of the received vehicles.
     pub boots: Boots,
     /// The vehicles of the boots that are not shown.
     pub(crate) others: BTreeMap<BootId, Vehicle>,
@@ -187,7 +187,7 @@ pub struct Model {
     pub commands: Commands,
     /// The open dialog, if any.
     pub dialog: Option<Dialog>,
-    /// What is left of a typed word that is no longer wanted.
+    /// The rest of a typed word that is no longer wanted.
     pub rest_of_word: Option<RestOfWord>,
     pub abort_chord: AbortChord,
     pub key_timing: KeyTiming,
@@ -204,27 +204,26 @@ pub struct Model {
     pub log: LogHealth,
     /// When it last lost records.
     pub(crate) log_loses_at: Option<Duration>,
-    /// The crew goes on although its log has this fault.
+    /// The crew continues although the log has this fault.
     pub(crate) without_log: Option<LogFault>,
     /// The boot that the crew arms although no burn of its motor's lot has confirmed its curve.
     pub(crate) untested: Option<u32>,
     pub alarms: Alarms,
     pub pages: Pages,
     pub history: History,
-    /// The checklist of the mission, as the station keeps it; `None` without one.
+    /// The checklist of the mission, as the station stores it; `None` without one.
     pub checklist: Option<Checklist>,
     /// Why a step was not signed or voided, and when.
     pub(crate) sign_refused: Option<(String, Duration)>,
-    /// The last place of the vehicle: of this flight, or kept from before a restart.
+    /// The last position of the vehicle: of this flight, or stored before a restart.
     pub place: Option<LastPlace>,
-    /// An abort of an earlier run of this station, or of its screen, that was asked for and not
-    /// confirmed.
+    /// An unconfirmed abort of an earlier run of this station, or of its screen.
     pub(crate) abort_before: Option<String>,
     /// When a screen that commands nothing was last given a command.
     pub(crate) nothing_sent_at: Option<Duration>,
-    /// What is stored of it beside the log.
-    pub(crate) kept: Option<Unfinished>,
-    /// When it is looked at next.
+    /// The unfinished state last stored beside the log.
+    pub(crate) stored_unfinished: Option<Unfinished>,
+    /// When the last position is checked next.
     pub(crate) place_due: Option<Duration>,
     /// The radio range test, once one has begun.
     pub range_test: Option<RangeTest>,
@@ -232,13 +231,13 @@ pub struct Model {
     pub(crate) check_entered: Option<(u32, u16)>,
     /// The end of the station's book.
     pub book: BookState,
-    /// What was last said of the danger, and of whether people may approach.
-    pub(crate) approach_told: (Option<Danger>, Option<&'static str>),
-    /// What has been called out.
+    /// The danger and the approach headline that were last reported.
+    pub(crate) reported_approach: (Option<Danger>, Option<&'static str>),
+    /// The callouts made so far.
     pub called: Called,
     /// `None` for a live flight.
     pub playing: Option<Playback>,
-    /// When the vehicle rebooted, and what it did then.
+    /// The state in which the vehicle rebooted, and when.
     pub(crate) rebooted: Option<(&'static str, Duration)>,
     pub(crate) texts: Reassembler,
     pub(crate) due: Due,
@@ -249,7 +248,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// A model that knows nothing yet.
+    /// A model without any received data.
     ///
     /// A screen of a station in another process first receives the history, until
     /// [`Alarms::history_ends`].
@@ -288,7 +287,7 @@ impl Model {
     }
 
     /// Adds an event to the list, to the log and to the book.
-    pub(crate) fn say(
+    pub(crate) fn add_event(
         &mut self,
         now: Duration,
         speaker: Speaker,
@@ -299,16 +298,16 @@ impl Model {
         let is_vehicle = matches!(speaker, Speaker::Vehicle);
         let who = if is_vehicle { self.boot_beside_others(now) } else { String::new() };
         self.enter(if is_vehicle { "vehicle says" } else { "event" }, &who, &text);
-        self.tell(now, speaker, level, text);
+        self.list_event(now, speaker, level, text);
     }
 
-    /// Adds an event to the list and to the log; the book has it already.
-    pub(crate) fn tell(&mut self, now: Duration, speaker: Speaker, level: EventLevel, text: String) {
+    /// Adds an event to the list and to the log, when the book has it already.
+    pub(crate) fn list_event(&mut self, now: Duration, speaker: Speaker, level: EventLevel, text: String) {
         self.outbox.push(Action::event(speaker, level, &text));
         self.events.push(now, speaker, level, text);
     }
 
-    /// Records in the log what the crew did and what followed.
+    /// Records an action of the crew in the log and the book.
     pub(crate) fn record_operator(&mut self, now: Duration, kind: &str, by: &Seat, detail: &str) {
         self.outbox.push(Action::Record(Record::OperatorAction(OperatorAction {
             time_s: now.as_secs_f64(),
@@ -318,13 +317,20 @@ impl Model {
         self.enter(kind, &by.operator, detail);
     }
 
-    /// Records what the crew did, and adds it to the list of events.
-    pub(crate) fn tell_act(&mut self, now: Duration, kind: &str, by: &Seat, level: EventLevel, text: String) {
+    /// Records an action of the crew, and adds it to the list of events.
+    pub(crate) fn report_action(
+        &mut self,
+        now: Duration,
+        kind: &str,
+        by: &Seat,
+        level: EventLevel,
+        text: String,
+    ) {
         self.record_operator(now, kind, by, &text);
-        self.tell(now, Speaker::Ground, level, text);
+        self.list_event(now, Speaker::Ground, level, text);
     }
 
-    /// The boot of the vehicle that is shown, while others are heard beside it; else nothing.
+    /// The boot of the shown vehicle while others are received beside it; otherwise empty.
     pub(crate) fn boot_beside_others(&self, now: Duration) -> String {
         let boot = self.vehicle.boot.number().filter(|_| self.beside(now).is_some());
         boot.map_or_else(String::new, |boot| format!("boot {}", words::boot(boot)))
@@ -340,17 +346,17 @@ impl Model {
     }
 
     pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {
-        self.say(now, Speaker::Ground, EventLevel::Info, text);
+        self.add_event(now, Speaker::Ground, EventLevel::Info, text);
     }
 
     pub(crate) fn warn(&mut self, now: Duration, text: impl Into<String>) {
-        self.say(now, Speaker::Ground, EventLevel::Warning, text);
+        self.add_event(now, Speaker::Ground, EventLevel::Warning, text);
     }
 }
 
-// What the model asks of the run loop: messages to send, records to write, requests to the station.
+// Requests to the run loop: messages to send, records to write, requests to the station.
 
-/// What a screen in another process asks its station to do.
+/// A request of a screen in another process to its station.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
     /// The crew has completed every step of this command: send it.
@@ -369,7 +375,7 @@ pub enum Request {
     Untested,
     /// The crew has signed or voided this step of the checklist, counted from zero.
     Sign { step: u8, void: bool },
-    /// Keep this note in the log and the book.
+    /// Record this note in the log and the book.
     Note(String),
 }
 
@@ -383,21 +389,21 @@ pub struct BookLine {
     pub text: String,
 }
 
-/// What `update` wants the run loop to do.
+/// A task for the run loop.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
     /// Send a message to the vehicle.
     Send(Box<MavMessage>),
     /// Write a record into the log.
     Record(Record),
-    /// The checklist has changed: keep the change, and show it on every screen.
-    KeepChecklist(ChecklistEntry),
-    /// Tell the screens why a step of the checklist is not signed or voided.
+    /// The checklist has changed: store the change, and show it on every screen.
+    StoreChecklist(ChecklistEntry),
+    /// Report to the screens why a step of the checklist is not signed or voided.
     RefuseSignature(String),
-    /// Keep the last place of the vehicle in the files for maps.
-    KeepPlace(Box<LastPlace>),
-    /// Keep beside the log what must not be forgotten when the station ends.
-    KeepUnfinished(Unfinished),
+    /// Store the last position of the vehicle in the files for maps.
+    StorePlace(Box<LastPlace>),
+    /// Store beside the log what must survive the end of the station.
+    StoreUnfinished(Unfinished),
     /// Write the report of the flight.
     WriteReport,
     /// Move the pin of the demonstration's vehicle: out, or in.
@@ -410,14 +416,14 @@ pub enum Action {
     Redraw,
     /// Change the screen's colours to the next theme.
     NextTheme,
-    /// The crew asks for this: a screen in another process asks its station, the station tells its
-    /// other screens.
+    /// Pass on this request of the crew: a screen in another process sends it to its station, the
+    /// station to its other screens.
     Request(Request),
     /// Give the terminal back and continue without a screen.
     LeaveScreen,
     Bell,
     /// Call this out with the crew's voice.
-    Say(String),
+    CallOut(String),
     /// An alarm was raised: run the alarm command with its text.
     Alarm(String),
     Quit,
@@ -434,7 +440,7 @@ impl Action {
     }
 }
 
-// How the flight ended, as far as the ground has seen it; the exit code follows from it.
+// The flight's progress as received by the ground; the exit code follows from it.
 
 /// How the flight has gone so far.
 #[derive(Debug, Clone, Default, PartialEq)]

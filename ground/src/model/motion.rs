@@ -14,8 +14,8 @@ pub const GRAVITY_M_S2: f64 = 9.806_65;
 const SPAN_MS: u32 = 1_000;
 /// Over a shorter time the difference of two velocities is mostly noise.
 const SPAN_MIN_MS: u32 = 300;
-/// How many samples are kept at most.
-const TREND_KEPT: usize = 64;
+/// Maximum number of samples.
+const TREND_MAX: usize = 64;
 
 /// The velocities of the last second under the same forces, by the vehicle's clock, so that radio
 /// delays do not look like accelerations.
@@ -39,7 +39,7 @@ impl Trend {
         }
         let is_old = |at_ms: u32| boot_ms - at_ms > SPAN_MS;
         while self.velocities.front().is_some_and(|(at_ms, _)| is_old(*at_ms))
-            || self.velocities.len() >= TREND_KEPT
+            || self.velocities.len() >= TREND_MAX
         {
             self.velocities.pop_front();
         }
@@ -75,8 +75,8 @@ fn phase_by_forces(phase: TdPhase) -> TdPhase {
 
 // The path that the vehicle flew, in a bounded number of points.
 
-const PATH_KEPT: usize = 512;
-/// A position further away than this is not believed.
+const PATH_POINTS_MAX: usize = 512;
+/// Maximum distance of a plausible position, m.
 const POSITION_MAX_M: f64 = 1e5;
 
 /// Adds a position to a path. When the path gets too long, every second point is dropped.
@@ -86,7 +86,7 @@ pub(super) fn extend_path(path: &mut Vec<NorthEastUp>, motion: &Motion) {
     if !is_position || path.last() == Some(&point) {
         return;
     }
-    if path.len() >= PATH_KEPT {
+    if path.len() >= PATH_POINTS_MAX {
         every_second(path);
     }
     path.push(point);
@@ -154,7 +154,7 @@ mod flown_path_tests {
     use super::*;
 
     #[test]
-    fn a_long_path_keeps_its_ends_and_stays_bounded() {
+    fn a_long_path_is_bounded_and_retains_its_ends() {
         let mut flown = Vec::new();
         for k in 0..10_000_u32 {
             let motion = Motion { x_m: f64::from(k), y_m: 0.0, ..Motion::vertical(f64::from(k), 0.0) };
@@ -164,7 +164,7 @@ mod flown_path_tests {
         extend_path(&mut flown, &Motion { x_m: f64::NAN, y_m: 0.0, ..Motion::vertical(1.0, 0.0) });
         extend_path(&mut flown, &Motion { x_m: 1e9, y_m: 0.0, ..Motion::vertical(1.0, 0.0) });
         let points = &flown;
-        assert!(points.len() <= PATH_KEPT);
+        assert!(points.len() <= PATH_POINTS_MAX);
         assert_eq!((points.first(), points.last()), (Some(&[0.0; 3]), Some(&[9_999.0, 0.0, 9_999.0])));
         assert!(points.is_sorted_by(|before, after| before[0] < after[0]));
     }

@@ -1,5 +1,5 @@
-//! The checks on the pad: the vehicle's own check as it tells it value by value, and the radio
-//! range test.
+//! The checks on the pad: the vehicle's self-check, reported value by value, and the radio range
+//! test.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -11,13 +11,14 @@ use protocol::link_stats::FrameCounts;
 
 use super::{Acknowledgement, CommandKind, Model, Seat, words};
 
-/// A check with motion takes 13 s, and 40 s if people watch the surfaces. If neither answer nor end
-/// of one that was asked for is heard, it may run for so long.
+/// How long a requested check may run without a received answer or end. One with motion takes 13 s,
+/// and 40 s if people watch the surfaces.
 const LONGEST: Duration = Duration::from_secs(50);
 /// What the vehicle reported before it had a command may arrive so much later than the command was
 /// given.
 const LATE: Duration = Duration::from_secs(3);
-/// Whoever presses the key again to end a check that has just ended does not want another one.
+/// A second press of the key this soon after the end of a check was intended to end it, not to
+/// begin another.
 const JUST_ENDED: Duration = Duration::from_secs(3);
 
 /// The surfaces in the order in which a check moves them, the number of the first item of each, and
@@ -32,12 +33,12 @@ pub const SURFACES: [(&str, u32, &str); 6] = [
     ("fin 4", 15, "fin 4 alone opens fully, then closes"),
 ];
 
-/// How a check stands, as far as this station can know.
+/// State of a check, as far as this station has received it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// The vehicle says that it runs.
+    /// The vehicle reports that it runs.
     Runs,
-    /// It was asked for; what came of it is not known.
+    /// It was requested; the outcome has not arrived.
     MayRun,
     /// It ended a moment ago.
     JustEnded,
@@ -45,19 +46,19 @@ pub enum Standing {
     Rests,
 }
 
-/// How the check of a vehicle stands.
+/// The state of a vehicle's check.
 pub fn standing(model: &Model, now: Duration) -> Standing {
-    let told = model.vehicle.pad_check.as_ref();
-    let asked = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
+    let report = model.vehicle.pad_check.as_ref();
+    let requested = [CommandKind::Check, CommandKind::CheckStill].map(|kind| model.commands.of(kind));
     let ended = model.commands.of(CommandKind::EndCheck).filter(|end| end.accepted());
-    let may_run = asked.into_iter().flatten().any(|asked| {
-        let is_refused = matches!(asked.acknowledged, Acknowledgement::Answered(_)) && !asked.accepted();
-        let is_told = told.is_some_and(|told| told.told_at > asked.commanded_at + LATE);
-        let is_ended = ended.is_some_and(|end| end.commanded_at > asked.commanded_at);
-        !is_refused && !is_told && !is_ended && now.saturating_sub(asked.commanded_at) < LONGEST
+    let may_run = requested.into_iter().flatten().any(|track| {
+        let is_refused = matches!(track.acknowledged, Acknowledgement::Answered(_)) && !track.accepted();
+        let is_reported = report.is_some_and(|report| report.reported_at > track.commanded_at + LATE);
+        let is_ended = ended.is_some_and(|end| end.commanded_at > track.commanded_at);
+        !is_refused && !is_reported && !is_ended && now.saturating_sub(track.commanded_at) < LONGEST
     });
-    match told.and_then(|told| told.ended_at) {
-        _ if told.is_some_and(PadCheck::is_running) => Standing::Runs,
+    match report.and_then(|report| report.ended_at) {
+        _ if report.is_some_and(PadCheck::is_running) => Standing::Runs,
         _ if may_run => Standing::MayRun,
         Some(at) if now.saturating_sub(at) < JUST_ENDED => Standing::JustEnded,
         _ => Standing::Rests,
@@ -67,53 +68,53 @@ pub fn standing(model: &Model, now: Duration) -> Standing {
 /// A check, as far as its messages have arrived.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PadCheck {
-    /// What the vehicle last reported. Its own value may be one that is in [`Self::values`] too.
-    pub told: TD_PAD_CHECK_DATA,
+    /// The vehicle's last report. Its value may be one of [`Self::values`] too.
+    pub report: TD_PAD_CHECK_DATA,
     /// When the vehicle last reported it.
-    pub told_at: Duration,
-    /// When the vehicle was first heard to say that it is over, after it was heard to run.
+    pub reported_at: Duration,
+    /// When the first report of its end arrived, after a report that it runs.
     pub ended_at: Option<Duration>,
     /// The values that have arrived, by their place. No limit is NaN.
     values: BTreeMap<u8, TD_PAD_CHECK_DATA>,
 }
 
 impl PadCheck {
-    /// This check with what the vehicle tells now. Another number is another check.
-    pub(crate) fn with(before: Option<Self>, told: &TD_PAD_CHECK_DATA, now: Duration) -> Self {
-        let before = before.filter(|before| before.told.run == told.run);
-        let runs = told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING;
+    /// This check with another report. Another number is another check.
+    pub(crate) fn with(before: Option<Self>, report: &TD_PAD_CHECK_DATA, now: Duration) -> Self {
+        let before = before.filter(|before| before.report.run == report.run);
+        let runs = report.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING;
         let ended_at = before
             .as_ref()
             .and_then(|before| if before.is_running() && !runs { Some(now) } else { before.ended_at });
         let mut values = before.map_or_else(BTreeMap::new, |before| before.values);
-        if told.place < told.found {
-            values.insert(told.place, told.clone());
+        if report.place < report.found {
+            values.insert(report.place, report.clone());
         }
-        Self { told: told.clone(), told_at: now, ended_at, values }
+        Self { report: report.clone(), reported_at: now, ended_at, values }
     }
 
     pub fn is_running(&self) -> bool {
-        self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
+        self.report.state == TdPadCheckState::TD_PAD_CHECK_STATE_RUNNING
     }
 
-    /// Whether it moved surfaces that tell nothing, and nothing else was wrong: people say what
-    /// they saw.
+    /// Whether it moved surfaces without feedback, and every other value is in order: people
+    /// confirm what they saw.
     pub fn awaits_eyes(&self) -> bool {
-        let told = |item: TdPadCheckItem| self.of(item).map(|value| value.verdict);
-        self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED
-            && told(TdPadCheckItem::TD_PAD_CHECK_ITEM_FIN_1_RANGE)
+        let verdict = |item: TdPadCheckItem| self.of(item).map(|value| value.verdict);
+        self.report.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED
+            && verdict(TdPadCheckItem::TD_PAD_CHECK_ITEM_FIN_1_RANGE)
                 == Some(TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED)
     }
 
     /// Whether it is over, and every value that it found has arrived.
-    pub fn is_whole(&self) -> bool {
-        !self.is_running() && self.values.len() == usize::from(self.told.found)
+    pub fn is_complete(&self) -> bool {
+        !self.is_running() && self.values.len() == usize::from(self.report.found)
     }
 
-    /// Whether it has seen everything, and every value has arrived.
+    /// Whether it ran to its end, and every value has arrived.
     pub fn is_judged(&self) -> bool {
-        let stopped = self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED;
-        self.told.found > 0 && !stopped && self.is_whole()
+        let stopped = self.report.state == TdPadCheckState::TD_PAD_CHECK_STATE_STOPPED;
+        self.report.found > 0 && !stopped && self.is_complete()
     }
 
     /// What has arrived, in the order in which it was found.
@@ -130,7 +131,7 @@ impl PadCheck {
     pub fn failure(&self) -> Option<String> {
         let names: Vec<String> = self.failing().map(|value| shown(value).0).collect();
         let outside = if names.is_empty() { String::new() } else { format!(": {}", names.join(", ")) };
-        (self.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_FAILED)
+        (self.report.state == TdPadCheckState::TD_PAD_CHECK_STATE_FAILED)
             .then(|| format!("CHECK FAILED{outside}"))
     }
 
@@ -171,14 +172,14 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, impl Fn(f32) -
     (name, unit, move |number: f32| words::fixed(factor * f64::from(number), decimals))
 }
 
-// The radio range test: how much is lost both ways, and how far the signal is above the noise.
-//
-// It asks the vehicle for the time five times a second and counts the answers, and the gaps in what
-// the vehicle sends. It sends nothing that commands.
+// The radio range test: how much is lost both ways, and how far the signal is above the noise. It
+// requests the vehicle's time five times a second and counts the answers, and the gaps in the
+// vehicle's frames. It sends no command.
 
-/// How long it asks. With 150 questions a loss of 5 % is known to 3.5 percentage points (95 %).
-pub const ASKS_FOR: Duration = Duration::from_secs(30);
-pub const ASKS_EVERY: Duration = Duration::from_millis(200);
+/// Duration of the requests. With 150 of them a loss of 5 % is measured to 3.5 percentage points
+/// (95 %).
+pub const QUERIES_FOR: Duration = Duration::from_secs(30);
+pub const QUERY_INTERVAL: Duration = Duration::from_millis(200);
 /// Then it waits for the last answers: a slow radio with a full queue takes a second.
 pub const WAITS_FOR: Duration = Duration::from_secs(2);
 
@@ -191,11 +192,11 @@ pub const MARGIN_LEAST_DB: f64 = 10.0;
 /// Steps of a SiK radio's RSSI in 1 dB: its manual gives RSSI = 1.9 (dBm + 127).
 const STEPS_PER_DB: f64 = 1.9;
 
-/// Signal over noise, dB, at the worse end; `None` if the radio does not know.
+/// Signal over noise, dB, at the worse end; `None` if the radio does not report it.
 pub fn margin_db(radio: &RADIO_STATUS_DATA) -> Option<f64> {
     let known = |signal: u8, noise: u8| {
-        let told = signal != u8::MAX && noise != u8::MAX;
-        told.then(|| (f64::from(signal) - f64::from(noise)) / STEPS_PER_DB)
+        let is_reported = signal != u8::MAX && noise != u8::MAX;
+        is_reported.then(|| (f64::from(signal) - f64::from(noise)) / STEPS_PER_DB)
     };
     let (here, there) = (known(radio.rssi, radio.noise), known(radio.remrssi, radio.remnoise));
     here.into_iter().chain(there).reduce(f64::min)
@@ -231,7 +232,7 @@ impl RangeTestResult {
         };
         let margin = match self.margin_db {
             Some(margin_db) => format!("margin {margin_db:.1} dB (at least {MARGIN_LEAST_DB:.0})"),
-            None => "margin not known: the radio tells none".to_owned(),
+            None => "margin not known: the radio reports none".to_owned(),
         };
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         format!(
@@ -251,9 +252,9 @@ pub struct RangeTest {
     pub found: Option<RangeTestResult>,
     counts_before: FrameCounts,
     counts: FrameCounts,
-    asked: u32,
+    queries: u32,
     answered: u32,
-    /// Questions without an answer, by their time stamps, ns.
+    /// Requests without an answer, by their time stamps, ns.
     open: BTreeSet<i64>,
     due_at: Duration,
     margin_db: Option<f64>,
@@ -269,7 +270,7 @@ impl RangeTest {
     }
 
     pub fn left(&self, now: Duration) -> Duration {
-        (self.began_at + ASKS_FOR + WAITS_FOR).saturating_sub(now)
+        (self.began_at + QUERIES_FOR + WAITS_FOR).saturating_sub(now)
     }
 
     /// What has been found so far.
@@ -280,14 +281,15 @@ impl RangeTest {
         );
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 1.0 };
         let loss_down = share(lost as f64, (arrived + lost) as f64);
-        // An answer took both ways: what the way down lost of them is not the way up's.
-        // If the way down loses all of them, nothing is known of the way up, which is no pass.
-        let (answered, could_arrive) = (f64::from(self.answered), f64::from(self.asked) * (1.0 - loss_down));
+        // An answer takes both directions: the share lost on the downlink is not the uplink's. If
+        // the downlink loses all of them, the uplink's loss is unknown, which is no pass.
+        let (answered, could_arrive) =
+            (f64::from(self.answered), f64::from(self.queries) * (1.0 - loss_down));
         let loss_up = if could_arrive > 0.0 { (1.0 - answered / could_arrive).max(0.0) } else { 1.0 };
         RangeTestResult { loss_down, loss_up, margin_db: self.margin_db, stopped }
     }
 
-    /// Lets time pass. Returns the time stamp of a question to send now, ns.
+    /// Lets time pass. Returns the time stamp of a request to send now, ns.
     pub(crate) fn pass(&mut self, counts: FrameCounts, now: Duration) -> Option<i64> {
         if self.is_running() {
             self.counts = counts;
@@ -295,25 +297,25 @@ impl RangeTest {
         if self.is_running() && self.left(now).is_zero() {
             self.found = Some(self.so_far(None));
         }
-        let asks = self.is_running() && now < self.began_at + ASKS_FOR && now >= self.due_at;
-        if !asks {
+        let is_due = self.is_running() && now < self.began_at + QUERIES_FOR && now >= self.due_at;
+        if !is_due {
             return None;
         }
-        self.due_at = (self.due_at + ASKS_EVERY).max(now);
+        self.due_at = (self.due_at + QUERY_INTERVAL).max(now);
         let stamp = i64::try_from(now.as_nanos()).ok()?;
-        self.asked += 1;
+        self.queries += 1;
         self.open.insert(stamp);
         Some(stamp)
     }
 
-    /// The vehicle has answered the question with this time stamp, ns.
+    /// The vehicle has answered the request with this time stamp, ns.
     pub(crate) fn answered(&mut self, stamp: i64) {
         if self.is_running() && self.open.remove(&stamp) {
             self.answered += 1;
         }
     }
 
-    pub(crate) fn hear_radio(&mut self, radio: &RADIO_STATUS_DATA) {
+    pub(crate) fn note_radio(&mut self, radio: &RADIO_STATUS_DATA) {
         if self.is_running() {
             self.margin_db = self.margin_db.into_iter().chain(margin_db(radio)).reduce(f64::min);
         }
@@ -342,8 +344,8 @@ mod tests {
             lost: 7 + (n * 10).checked_div(lost_of).unwrap_or(0),
         };
         let mut test = RangeTest::begin(Seat::default(), counts(0), Duration::from_secs(100));
-        for told in margins {
-            test.hear_radio(told);
+        for report in margins {
+            test.note_radio(report);
         }
         let mut questions = 0;
         for tick in 0..400_u64 {
@@ -402,10 +404,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_share_is_one(arrived: u32, lost: u32, answered in 0..200_u32, asked in 0..200_u32) {
+        fn every_share_is_one(arrived: u32, lost: u32, answered in 0..200_u32, queries in 0..200_u32) {
             let mut test = RangeTest::begin(Seat::default(), FrameCounts::default(), Duration::ZERO);
             test.counts = FrameCounts { arrived: arrived.into(), lost: lost.into() };
-            (test.asked, test.answered) = (asked, answered.min(asked));
+            (test.queries, test.answered) = (queries, answered.min(queries));
             let found = test.so_far(None);
             prop_assert!((0.0..=1.0).contains(&found.loss_down) && (0.0..=1.0).contains(&found.loss_up));
         }

@@ -1,5 +1,5 @@
-//! Where to look for the vehicle after a flight: the last place where it was heard, the predicted
-//! one, and its file for maps.
+//! Where to look for the vehicle after a flight: its last received position, the predicted one, and
+//! the file for maps.
 
 use std::time::Duration;
 
@@ -7,16 +7,16 @@ use protocol::dialect::ESTIMATOR_STATUS_DATA;
 pub use protocol::motion::Degrees;
 use serde::{Deserialize, Serialize};
 
-use super::{Model, Sample, dead_reckoning::predict_position};
-
-/// The error of a place where the vehicle was heard, m: usual for a satellite receiver.
-const HEARD_ERROR_M: f64 = 1.5;
+use super::{
+    Model, Sample,
+    dead_reckoning::{POSITION_ERROR_M, predict_position},
+};
 
 /// Radius around a position that holds it in 19 of 20 cases, in standard deviations of each axis:
 /// sqrt(-2 ln 0.05).
 const WITHIN_95: f64 = 2.45;
 
-/// A place over the ground, from the pad, and how wrong it may be.
+/// A position over the ground, from the pad, with its error.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spot {
     pub north_m: f64,
@@ -26,19 +26,19 @@ pub struct Spot {
     pub error_m: f64,
 }
 
-/// The last that is known of a vehicle that has left the pad.
+/// The last position of a vehicle that has left the pad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LastPlace {
     /// The vehicle's boot number.
     pub boot: u32,
-    /// When it was last heard there: seconds since 1970, UTC.
-    pub heard_unix_s: u64,
-    pub heard: Spot,
-    /// Height above the pad when it was last heard, m.
+    /// When the position was received: seconds since 1970, UTC.
+    pub received_unix_s: u64,
+    pub received: Spot,
+    /// Height above the pad at that time, m.
     pub height_m: f64,
     /// Where it is predicted to be, if it fell silent in flight.
     pub predicted: Option<Spot>,
-    /// Where the pad is, if that is known.
+    /// The position of the pad, if available.
     pub pad: Option<Degrees>,
 }
 
@@ -55,7 +55,7 @@ pub struct Way {
 impl LastPlace {
     /// Where to look first.
     pub fn best(&self) -> Spot {
-        self.predicted.unwrap_or(self.heard)
+        self.predicted.unwrap_or(self.received)
     }
 
     /// The point on the Earth of a spot, if the pad is known.
@@ -80,62 +80,61 @@ impl LastPlace {
 }
 
 impl Model {
-    /// The last that is known of the vehicle in this flight; `None` before it left the pad.
+    /// The vehicle's last position in this flight; `None` before it left the pad.
     pub fn last_place(&self, now: Duration) -> Option<LastPlace> {
         let left_at = self.vehicle.left_pad_at?;
         let motion = self.vehicle.best_motion().filter(|motion| motion.received_at >= left_at);
-        let (heard, height_m, at) = match (motion, self.vehicle.verdict()) {
+        let (received, height_m, at) = match (motion, self.vehicle.verdict()) {
             (Some(Sample { value, received_at }), _) => {
-                let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: self.heard_error_m() };
+                let spot = Spot { north_m: value.x_m, east_m: value.y_m, error_m: self.position_error_m() };
                 (spot, value.altitude_m, received_at)
             }
-            // A verdict tells the distance from the pad, and no direction.
+            // A verdict has the distance from the pad, and no direction.
             (None, Some(Sample { value, received_at })) => {
-                let spot = Spot { error_m: value.touchdown.distance_m + HEARD_ERROR_M, ..Spot::default() };
+                let spot = Spot { error_m: value.touchdown.distance_m + POSITION_ERROR_M, ..Spot::default() };
                 (spot, value.touchdown.height_m, received_at)
             }
             (None, None) => return None,
         };
         Some(LastPlace {
             boot: self.vehicle.boot.number().unwrap_or(0),
-            heard_unix_s: self.settings.start_unix_s + at.as_secs(),
-            heard,
+            received_unix_s: self.settings.start_unix_s + at.as_secs(),
+            received,
             height_m,
             predicted: predict_position(&self.vehicle, now).map(|at| at.spot),
             pad: self.vehicle.pad,
         })
     }
 
-    /// Error of the position that the vehicle reports, m: its own accuracy, if that is worse than
-    /// usual.
-    pub(crate) fn heard_error_m(&self) -> f64 {
+    /// Error of the reported position, m: the vehicle's accuracy, if that is worse than usual.
+    pub(crate) fn position_error_m(&self) -> f64 {
         let sigma_m = |status: Sample<ESTIMATOR_STATUS_DATA>| f64::from(status.value.pos_horiz_accuracy);
-        self.vehicle.last().map_or(0.0, |status| WITHIN_95 * sigma_m(status)).max(HEARD_ERROR_M)
+        self.vehicle.last().map_or(0.0, |status| WITHIN_95 * sigma_m(status)).max(POSITION_ERROR_M)
     }
 
-    /// Where a vehicle that left the pad unheard is meant to come down: at the touchdown that it
-    /// predicted, else at the pad, anywhere inside the fence of its mission. `None` if it has
+    /// Intended touchdown of a vehicle that left the pad in silence: the touchdown that it
+    /// predicted, else the pad, with the fence of its mission as the error. `None` if it has
     /// reported no fence.
-    pub fn meant_to_come_down(&self) -> Option<Spot> {
+    pub fn intended_touchdown(&self) -> Option<Spot> {
         let fence_m = self.vehicle.fence_m()?;
         let predicted = self.vehicle.descent().map(|descent| descent.value);
-        let known =
+        let finite =
             |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);
         Some(Spot {
-            north_m: known(predicted.as_ref().map(|descent| descent.touchdown_x_m)),
-            east_m: known(predicted.map(|descent| descent.touchdown_y_m)),
+            north_m: finite(predicted.as_ref().map(|descent| descent.touchdown_x_m)),
+            east_m: finite(predicted.map(|descent| descent.touchdown_y_m)),
             error_m: fence_m,
         })
     }
 }
 
-// The last known place of a vehicle as KML, for maps. What the station needs after a restart is
-// kept beside it, also while nobody knows where the pad is on the Earth.
+// The last position of a vehicle as KML, for maps. The file for a restart of the station is stored
+// beside it, also without the pad's position on the Earth.
 
 /// Corners of the polygon that stands for the circle of uncertainty.
 const CORNERS: u32 = 36;
 
-/// The KML of a place; `None` if nobody knows where the pad is on the Earth.
+/// The KML of a position; `None` without the pad's position on the Earth.
 pub fn kml(place: &LastPlace) -> Option<String> {
     let pad = place.pad?;
     let coordinates = |at: Degrees| format!("{:.7},{:.7},0", at.longitude, at.latitude);
@@ -146,7 +145,7 @@ pub fn kml(place: &LastPlace) -> Option<String> {
         )
     };
     let mut marks = mark("pad", "", pad);
-    let spots = [("last heard", Some(place.heard)), ("predicted", place.predicted)];
+    let spots = [("last received", Some(place.received)), ("predicted", place.predicted)];
     for (name, spot) in spots.into_iter().filter_map(|(name, spot)| Some((name, spot?))) {
         let words = format!("within {:.0} m in 19 of 20 cases; boot {:08X}", spot.error_m, place.boot);
         marks += &mark(name, &words, pad.moved(spot.north_m, spot.east_m));
@@ -186,12 +185,12 @@ mod place_tests {
     }
 
     #[test]
-    fn the_way_is_from_the_station_if_both_places_are_known() {
+    fn the_way_is_from_the_station_if_both_positions_are_available() {
         let spot = Spot { north_m: 0.0, east_m: 100.0, error_m: 5.0 };
         let place = LastPlace {
             boot: 1,
-            heard_unix_s: 0,
-            heard: spot,
+            received_unix_s: 0,
+            received: spot,
             height_m: 3.0,
             predicted: None,
             pad: Some(PAD),
@@ -233,8 +232,8 @@ mod place_file_tests {
     fn place(pad: Option<Degrees>, predicted: bool) -> LastPlace {
         LastPlace {
             boot: 0x1A2B_3C4D,
-            heard_unix_s: 1_800_000_000,
-            heard: Spot { north_m: 10.5, east_m: -3.25, error_m: 1.5 },
+            received_unix_s: 1_800_000_000,
+            received: Spot { north_m: 10.5, east_m: -3.25, error_m: 1.5 },
             height_m: 42.0,
             predicted: predicted.then_some(Spot { north_m: 12.0, east_m: -4.0, error_m: 30.0 }),
             pad,
@@ -267,7 +266,7 @@ mod place_file_tests {
         let text = kml(&place(Some(PAD), true)).unwrap();
         for word in [
             "<name>pad</name>",
-            "<name>last heard</name>",
+            "<name>last received</name>",
             "<name>predicted</name>",
             "within 30 m",
             "<Polygon>",

@@ -32,7 +32,7 @@ impl Default for &Quantity {
 }
 
 impl Quantity {
-    /// The present value; `None` while it is not known.
+    /// The present value; `None` while it is not available.
     pub fn read(&self, model: &Model, now: Duration) -> Option<Sample<f64>> {
         (self.read)(model, now).filter(|sample| sample.value.is_finite())
     }
@@ -98,10 +98,10 @@ pub static ALL: [Quantity; COUNT] = [
         let battery = m.vehicle.battery()?;
         battery.value.percent.map(|percent| Sample::new(percent.into(), battery.received_at))
     }),
-    // Known only of a check that has seen everything.
+    // Only of a complete check.
     quantity("check failures", "", 0, |m, _| {
         let check = m.vehicle.pad_check.as_ref().filter(|check| check.is_judged())?;
-        Some(Sample::new(check.failing().count() as f64, check.told_at))
+        Some(Sample::new(check.failing().count() as f64, check.reported_at))
     }),
     quantity("link rate", "B/s", 0, |m, now| link(m, now, |figures| figures.rx_bytes_s)),
     quantity("link sent", "B/s", 0, |m, now| link(m, now, |figures| figures.tx_bytes_s)),
@@ -117,7 +117,7 @@ fn is_estimated(sample: &Sample<f64>) -> bool {
 }
 
 fn link(model: &Model, now: Duration, pick: fn(&LinkFigures) -> f64) -> Option<Sample<f64>> {
-    model.link.heard_at.map(|_| Sample::new(pick(&model.link.stats.figures(now)), now))
+    model.link.last_frame_at.map(|_| Sample::new(pick(&model.link.stats.figures(now)), now))
 }
 
 fn body(model: &Model, pick: fn(&BodySpeed) -> f64) -> Option<Sample<f64>> {
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_is_its_own_and_finds_its_quantity() {
+    fn every_name_is_unique_and_finds_its_quantity() {
         for quantity in &ALL {
             assert_eq!(Quantity::named(quantity.name), Some(quantity));
             assert_eq!(quantity.name, quantity.name.to_lowercase());

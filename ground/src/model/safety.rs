@@ -1,5 +1,4 @@
-//! What keeps people safe: the landing motor, holds, aborts and their effect, and how a flight
-//! ended.
+//! Safety of people: the landing motor, holds, aborts and their effect, and how a flight ended.
 
 use std::time::Duration;
 
@@ -12,18 +11,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     CommandKind, Event, Model, Role, Sample, Seat, Speaker, Vehicle, Verdict,
-    dead_reckoning::{is_unheard, may_have_left, predict_position},
+    dead_reckoning::{is_silent, may_have_left, predict_position},
     is_on_pad, role_name,
 };
 
-/// Why nobody may approach, the worst reason first.
+/// Why people must stay away, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Danger {
-    /// The motor is not lit, and only software keeps it from lighting.
+    /// The motor has not ignited, and only software inhibits it.
     Live,
     /// The same after the waiting time: a person may approach to insert the pin.
     LiveWaited,
-    /// The motor burns or has been commanded to light.
+    /// The motor burns, or ignition is commanded.
     Burning,
     /// After a flight the vehicle reports nothing about the motor.
     NotReported,
@@ -43,20 +42,18 @@ pub struct KeepAway {
 
 impl KeepAway {
     /// The present warning. `None` while a vehicle is being prepared, and while it flies as
-    /// planned.
-    ///
-    /// A waiting time goes on without the link: a burnt motor cools, and nothing can make it worse.
+    /// planned. A waiting time runs on without the link: a burnt motor only cools.
     pub fn of(vehicle: &Vehicle, now: Duration) -> Option<Self> {
-        Self::told(vehicle, now).or_else(|| vehicle.away_before(now))
+        Self::reported(vehicle, now).or_else(|| vehicle.away_before(now))
     }
 
-    /// What the vehicle's own state says of it.
-    fn told(vehicle: &Vehicle, now: Duration) -> Option<Self> {
+    /// The warning that follows from the vehicle's status.
+    fn reported(vehicle: &Vehicle, now: Duration) -> Option<Self> {
         let sample = vehicle.status.as_ref()?;
         let status = &sample.value;
-        let told_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
+        let reported_s = (status.approach_wait_s != u16::MAX).then_some(status.approach_wait_s);
         let passed_s = u16::try_from(sample.age(now).as_secs()).unwrap_or(u16::MAX);
-        let wait_s = told_s.map(|told_s| told_s.saturating_sub(passed_s));
+        let wait_s = reported_s.map(|reported_s| reported_s.saturating_sub(passed_s));
         let danger = match status.motor {
             _ if !concerns(status) => return None,
             TdMotor::TD_MOTOR_LIVE if wait_s == Some(0) && !vehicle.in_flight() => Danger::LiveWaited,
@@ -89,7 +86,7 @@ impl KeepAway {
         format!("{}{}", self.headline(), self.reason())
     }
 
-    /// For how long, and the reason: what follows the words.
+    /// For how long, and the reason: the text after the headline.
     pub fn reason(&self) -> String {
         let left = self.wait_s.filter(|left_s| *left_s > 0);
         let left = left.map_or_else(String::new, |left_s| format!(" for {left_s} s"));
@@ -104,21 +101,19 @@ impl KeepAway {
     }
 }
 
-/// How long people wait for a vehicle that was reset before it could tell how long, s: its longest
-/// waiting time.
-const UNTOLD_WAIT_S: u16 = 60;
+/// Waiting time for a vehicle that was reset before it reported one, s: the vehicle's longest.
+const LONGEST_WAIT_S: u16 = 60;
 
 impl Vehicle {
-    /// The waiting time that ran before a power cycle or a restart of the station, while it lasts.
+    /// The waiting time that began before a power cycle or a restart of the station, while it runs.
     pub(crate) fn wait_before(&self, now: Duration) -> Option<KeepAway> {
         let before = self.before?;
         let passed_s = u16::try_from(before.age(now).as_secs()).unwrap_or(u16::MAX);
-        let left_s = before.value.wait_s.unwrap_or(UNTOLD_WAIT_S).saturating_sub(passed_s);
+        let left_s = before.value.wait_s.unwrap_or(LONGEST_WAIT_S).saturating_sub(passed_s);
         (left_s > 0).then_some(KeepAway { wait_s: Some(left_s), ..before.value })
     }
 
-    /// The same, and after it that the motor may be live, until the vehicle says of it what ends
-    /// that.
+    /// The same, and after it a motor that may be live, until the vehicle reports otherwise.
     fn away_before(&self, now: Duration) -> Option<KeepAway> {
         let live = || {
             let may_be = !matches!(self.before?.value.danger, Danger::Hot | Danger::Wait);
@@ -130,9 +125,10 @@ impl Vehicle {
         self.wait_before(now).or_else(live)
     }
 
-    /// The pin was seen, or the crew has armed it since: the motor is known again.
+    /// Ends the warning from before once the pin was reported, or the crew has armed since.
     pub(crate) fn end_before(&mut self, now: Duration) {
-        let pinned = self.status.as_ref().is_some_and(|told| told.value.motor == TdMotor::TD_MOTOR_PIN_IN);
+        let pinned =
+            self.status.as_ref().is_some_and(|reported| reported.value.motor == TdMotor::TD_MOTOR_PIN_IN);
         if (pinned || self.is_armed()) && self.wait_before(now).is_none() {
             self.before = None;
         } else if pinned && let Some(before) = &mut self.before {
@@ -141,46 +137,47 @@ impl Vehicle {
     }
 }
 
-/// What must not be forgotten when the station ends; it keeps it beside its log.
+/// State that must survive the end of the station; it is stored beside the log.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Unfinished {
-    /// An abort that was asked for and not confirmed: when, and by whom.
+    /// An unconfirmed abort: its time, operator and screen.
     pub abort: Option<String>,
-    /// Why people must keep away. For how long is not stored: no clock shows how long the station
+    /// Why people must stay away. For how long is not stored: no clock shows how long the station
     /// was off, so the wait runs again in full.
     pub danger: Option<Danger>,
 }
 
 impl Model {
-    /// What is unfinished now.
+    /// The state that is unfinished now.
     pub fn unfinished(&self, now: Duration) -> Unfinished {
         let abort = match self.commands.of(CommandKind::Abort) {
             Some(track) if track.is_confirmed() => None,
-            Some(track) => {
-                Some(asked_words(self.settings.start_unix_s + track.commanded_at.as_secs(), &track.by))
-            }
+            Some(track) => Some(abort_request_words(
+                self.settings.start_unix_s + track.commanded_at.as_secs(),
+                &track.by,
+            )),
             None => self.abort_before.clone(),
         };
         Unfinished { abort, danger: KeepAway::of(&self.vehicle, now).map(|away| away.danger) }
     }
 
-    /// Goes on with what an earlier run has left unfinished.
-    pub fn take_unfinished(&mut self, kept: Unfinished, now: Duration) {
-        self.kept = Some(kept.clone());
-        if let Some(asked) = &kept.abort {
-            let text = format!("an ABORT was asked for at {asked} and not confirmed");
-            self.say(now, Speaker::Ground, EventLevel::Error, text);
+    /// Restores the unfinished state of an earlier run.
+    pub fn take_unfinished(&mut self, unfinished: Unfinished, now: Duration) {
+        self.stored_unfinished = Some(unfinished.clone());
+        if let Some(at) = &unfinished.abort {
+            let text = format!("an ABORT was requested at {at} and not confirmed");
+            self.add_event(now, Speaker::Ground, EventLevel::Error, text);
         }
-        self.abort_before = kept.abort;
-        self.vehicle.before = kept.danger.map(|danger| {
+        self.abort_before = unfinished.abort;
+        self.vehicle.before = unfinished.danger.map(|danger| {
             let danger = if danger == Danger::LiveWaited { Danger::Live } else { danger };
-            Sample::new(KeepAway { danger, wait_s: Some(UNTOLD_WAIT_S) }, now)
+            Sample::new(KeepAway { danger, wait_s: Some(LONGEST_WAIT_S) }, now)
         });
     }
 }
 
-/// When an abort was asked for, and by whom.
-pub fn asked_words(unix_s: u64, by: &Seat) -> String {
+/// Time, operator and screen of an abort.
+pub fn abort_request_words(unix_s: u64, by: &Seat) -> String {
     let [hour, minute, second] = [unix_s / 3_600 % 24, unix_s / 60 % 60, unix_s % 60];
     format!("{hour:02}:{minute:02}:{second:02} UTC{}", by.in_brackets())
 }
@@ -188,7 +185,7 @@ pub fn asked_words(unix_s: u64, by: &Seat) -> String {
 /// Whether people may approach a vehicle that is down, or whose countdown was aborted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Approach {
-    /// They may not, but perhaps one person to insert the pin.
+    /// They may not; perhaps one person may, to insert the pin.
     Away(KeepAway),
     /// They may, for this reason.
     May(&'static str),
@@ -215,7 +212,7 @@ impl Approach {
         })
     }
 
-    /// The words that stand largest on every page.
+    /// The largest words of every page.
     pub fn headline(&self) -> &'static str {
         match self {
             Self::Away(away) => away.headline(),
@@ -223,7 +220,7 @@ impl Approach {
         }
     }
 
-    /// What follows the headline in a sentence: for how long, and the reason.
+    /// The text after the headline: for how long, and the reason.
     pub fn reason(&self) -> String {
         match self {
             Self::Away(away) => away.reason(),
@@ -232,7 +229,7 @@ impl Approach {
     }
 }
 
-/// Why a station is not stopped by a slip: its screens say when people may approach.
+/// Why stopping the station needs confirmation: its screens show when people may approach.
 pub fn why_not_stop(model: &Model, now: Duration) -> Option<String> {
     if model.is_at_risk() {
         return Some("the vehicle is armed or in flight".to_owned());
@@ -240,8 +237,8 @@ pub fn why_not_stop(model: &Model, now: Duration) -> Option<String> {
     KeepAway::of(&model.vehicle, now).map(|away| format!("people must keep away, {}", away.sentence()))
 }
 
-/// Why quitting has to be confirmed: as for [`why_not_stop`]. Nobody stands near the vehicle of a
-/// demonstration.
+/// Why quitting has to be confirmed: as for [`why_not_stop`]. A demonstration has no people near
+/// its vehicle.
 pub fn why_not_quit(model: &Model, now: Duration) -> Option<String> {
     let asks = model.settings.role.why_not_command().is_none();
     let is_near =
@@ -268,14 +265,14 @@ fn concerns(status: &TD_FLIGHT_STATUS_DATA) -> bool {
     }
 }
 
-/// In a countdown the vehicle notices after this long what is lost, s: station, screen, tap or
+/// Time after which the vehicle detects a loss in the countdown, s: of station, screen, tap or
 /// link.
 const NOTICED_AFTER_S: f64 = 1.0;
 
 impl Model {
     /// The time before the release, as it is shown here, from which on a hold comes too late, s:
-    /// what is shown is old by the way down, and a hold takes the way up. `None` if the vehicle
-    /// does not tell it.
+    /// the display is late by the downlink's latency, and a hold takes the uplink's. `None` if the
+    /// vehicle does not report it.
     pub fn last_hold_s(&self, vehicle: &Vehicle) -> Option<f64> {
         let round_trip = self.link.round_trip.unwrap_or_default();
         vehicle.last_hold_s().map(|last_s| last_s + round_trip.as_secs_f64())
@@ -291,7 +288,7 @@ impl Model {
         counted.peek().is_some() && counted.all(past)
     }
 
-    /// What a loss does to the countdown, in one sentence: station, screen, tap or link.
+    /// Effect of a loss of station, screen, tap or link on the countdown, in one sentence.
     pub fn loss_in_words(&self) -> Option<String> {
         let last_s = self.vehicle.last_hold_s()? + NOTICED_AFTER_S;
         Some(format!("What is lost before T-{last_s:.0} s holds the countdown; what is lost later may fly."))
@@ -310,16 +307,16 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
     let status = &vehicle.status.as_ref()?.value;
     let theirs =
         || held_by(vehicle).map_or_else(|| "its station".to_owned(), |who| format!("the station of {who}"));
-    let whom = if armed_here { "this station".to_owned() } else { theirs() };
+    let station = if armed_here { "this station".to_owned() } else { theirs() };
     let why = match status.hold {
         TdHold::TD_HOLD_NONE => return None,
-        TdHold::TD_HOLD_UPLINK_SILENT => format!("the vehicle did not hear {whom} for 1 s"),
-        TdHold::TD_HOLD_STATION_DEAF => format!("{whom} did not hear the vehicle for 1 s"),
+        TdHold::TD_HOLD_UPLINK_SILENT => format!("no uplink from {station} for 1 s"),
+        TdHold::TD_HOLD_STATION_DEAF => format!("no downlink at {station} for 1 s"),
         TdHold::TD_HOLD_CHECK_FAILED => {
             vehicle.held_for().map_or_else(|| "a check of the vehicle fails".to_owned(), |(_, words)| words)
         }
         TdHold::TD_HOLD_COMMANDED => {
-            format!("{} asked for it", held_by(vehicle).unwrap_or_else(|| "a station".to_owned()))
+            format!("{} requested it", held_by(vehicle).unwrap_or_else(|| "a station".to_owned()))
         }
         TdHold::TD_HOLD_TAP_OVERDUE => {
             let whose = held_by(vehicle).map_or_else(String::new, |who| format!(" of {who}"));
@@ -327,7 +324,7 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
         }
     };
     let held = status.phase == TdPhase::TD_PHASE_PAD_ARMED;
-    held.then(|| format!("HOLD: {why}; start anew; disarms in {} s", status.hold_left_s))
+    held.then(|| format!("HOLD: {why}; start again; disarms in {} s", status.hold_left_s))
 }
 
 // How a flight ended: one of four ends, each with its word.
@@ -335,27 +332,27 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
 /// A vehicle that hits the ground at this speed or faster, m/s, is a wreck: that of a fall from 5
 /// m. Its legs withstand 1 m/s, and under an open parachute it comes down at 6 m/s.
 const WRECKED_FROM_M_S: f64 = 10.0;
-/// After this long without a word, a vehicle in flight whose fall cannot be predicted is down: 300
-/// m under a parachute take 50 s.
+/// Silence after which a vehicle in flight whose fall cannot be predicted is down: 300 m under a
+/// parachute take 50 s.
 const SURELY_DOWN_AFTER: Duration = Duration::from_mins(2);
 
 /// The ends of a flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
-    /// It stands undamaged.
+    /// It stands, undamaged.
     Stands,
-    /// It stands, and is taken as damaged.
+    /// It stands, and counts as damaged.
     Upright,
     /// It came down under an open parachute.
     UnderParachute,
     /// It met the ground and did not stay upright.
     Hard,
-    /// It is a wreck, or it fell silent in flight and must be down.
+    /// It is a wreck, or it went silent in flight and must be down.
     Lost,
 }
 
 impl Ending {
-    /// The word that every screen uses, and the same in large letters.
+    /// The words of every screen, and the same in large letters.
     pub fn words(self) -> [&'static str; 2] {
         match self {
             Self::Stands => ["STANDS UNDAMAGED", "STANDS"],
@@ -395,16 +392,16 @@ impl Ending {
         }
     }
 
-    /// The word with what is known of this end.
+    /// The words with the details of this end.
     pub fn sentence(self, vehicle: &Vehicle) -> String {
         let reset = if vehicle.reset_in_flight { ", after a RESET IN FLIGHT" } else { "" };
         format!("{}{reset}{}", self.word(), self.detail(vehicle))
     }
 
-    /// What is known of this end: what follows the word.
+    /// The details of this end: the text after the words.
     pub fn detail(self, vehicle: &Vehicle) -> String {
         let Some(Sample { value: Verdict { landing, touchdown }, .. }) = vehicle.verdict() else {
-            let silent = ": it fell silent in flight and must be down";
+            let silent = ": it went silent in flight and must be down";
             return if self == Self::Lost { silent.to_owned() } else { String::new() };
         };
         let side = |bit| if landing.contains(bit) { "inside" } else { "outside" };
@@ -431,12 +428,12 @@ fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
     vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
 }
 
-/// Whether it fell silent in flight so long ago that it must have come down.
+/// Whether it went silent in flight so long ago that it must have come down.
 fn is_silent_and_down(vehicle: &Vehicle, now: Duration) -> bool {
     if let Some(since) = may_have_left(vehicle, now) {
         return since >= SURELY_DOWN_AFTER;
     }
-    if !is_unheard(vehicle, now) {
+    if !is_silent(vehicle, now) {
         return false;
     }
     let silence = vehicle.phase().map_or(Duration::ZERO, |phase| phase.age(now));
@@ -488,15 +485,14 @@ impl Touchdown {
     }
 }
 
-// Why the landing motor is inhibited for good.
+// Why the landing motor is inhibited permanently.
 
-/// A text of the vehicle this long before its latch is still about it: the text waits for the
-/// radio.
+/// A text of the vehicle may precede its latch by this long: the text waits for the radio.
 const TEXT_APART: Duration = Duration::from_secs(2);
 /// How many of the newest events are searched for the text.
 const TEXTS_SEARCHED: usize = 100;
 
-/// The cause that the vehicle tells; `None` if it tells none, or says it in a text only.
+/// The cause that the vehicle reports; `None` if it reports none, or only in a text.
 pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
     Some(match vehicle.status.as_ref()?.value.latch {
         TdLatch::TD_LATCH_NONE | TdLatch::TD_LATCH_OTHER => return None,
@@ -509,15 +505,15 @@ pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
     })
 }
 
-/// Whether it climbs, and nobody commanded it: people near the pad have seconds.
+/// Whether it climbs without a command: people near the pad have seconds.
 pub fn is_liftoff_by_itself(vehicle: &Vehicle) -> bool {
     let latch = vehicle.status.as_ref().map(|status| status.value.latch);
     let climbs = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
     climbs && latch == Some(TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF)
 }
 
-/// The latch in words, with its cause; `None` while nothing is latched. A motor that did not light
-/// has words of its own.
+/// The latch in words, with its cause; `None` while nothing is latched, and for a motor that did
+/// not ignite, which has its own words.
 pub fn latch_words(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;
     let aborted = vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
@@ -529,11 +525,11 @@ pub fn latch_words(model: &Model) -> Option<String> {
         (false, Some(_)) if !no_light => "MOTOR INHIBITED",
         (false, _) => return None,
     };
-    let told = match cause {
+    let reported = match cause {
         Some(COMMANDED) | None => abort_commanded_by(model).or(cause.map(str::to_owned)),
         Some(cause) => Some(cause.to_owned()),
     };
-    let cause = why_gate_stayed_shut(model).or(told).or_else(|| text_of_the_latch(model));
+    let cause = why_gate_stayed_shut(model).or(reported).or_else(|| text_of_the_latch(model));
     Some(cause.map_or_else(|| word.to_owned(), |cause| format!("{word}: {cause}")))
 }
 
@@ -563,8 +559,8 @@ pub fn sender_words(model: &Model, ids: &str) -> String {
     format!("{ids}{}", from.unwrap_or_default())
 }
 
-/// Which check kept the ignition gate shut: what the vehicle has found, or has said when it gave
-/// the gate up.
+/// The check that inhibited ignition: the vehicle's finding, or its text when it abandoned the
+/// landing.
 fn why_gate_stayed_shut(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;
     vehicle.status.as_ref().filter(|status| status.value.latch == TdLatch::TD_LATCH_GATE)?;
@@ -572,13 +568,13 @@ fn why_gate_stayed_shut(model: &Model) -> Option<String> {
     let found = found.iter().find_map(|(_, words)| words.strip_prefix("ignition gate stayed shut: "));
     let since = vehicle.left_pad_at.unwrap_or_default();
     let of_this_flight = |event: &&Event| event.at >= since && event.speaker == Speaker::Vehicle;
-    let mut said = model.events.newest(TEXTS_SEARCHED).filter(of_this_flight);
-    let said = || said.find_map(|event| event.text.strip_prefix("ignition gate closed: "));
-    found.or_else(said).map(|why| format!("gate stayed shut: {why}"))
+    let mut texts = model.events.newest(TEXTS_SEARCHED).filter(of_this_flight);
+    let given_up = || texts.find_map(|event| event.text.strip_prefix("ignition gate closed: "));
+    found.or_else(given_up).map(|why| format!("gate stayed shut: {why}"))
 }
 
-/// The first grave text of the vehicle about the time of its latch, for a cause that only a text
-/// tells: what follows is about the consequences.
+/// The first error text of the vehicle around its latch, for a cause that is only in a text: later
+/// texts are about the consequences.
 fn text_of_the_latch(model: &Model) -> Option<String> {
     let since = model.outcome.aborted_at?.saturating_sub(TEXT_APART);
     let mut events = model.events.newest(TEXTS_SEARCHED);
@@ -596,7 +592,7 @@ fn text_of_the_latch(model: &Model) -> Option<String> {
 /// uplink latency.
 const ONE_WAY_UNMEASURED: Duration = Duration::from_millis(250);
 
-/// Why an abort sent now would be too late for what the vehicle offers; `None` if it is in time, or
+/// Why an abort sent now would arrive too late for its reported effect; `None` if it is in time, or
 /// if that is unknown.
 pub fn abort_too_late(model: &Model, now: Duration) -> Option<&'static str> {
     // A report from before a loss of the link still counts: the time keeps running.

@@ -1,4 +1,4 @@
-//! Takes MAVLink messages into the model and converts units, axes and ranges.
+//! Applies MAVLink messages to the model and converts units, axes and ranges.
 
 use std::time::Duration;
 
@@ -17,20 +17,20 @@ use super::{
     Touchdown, Vehicle, Verdict, extend_path, is_on_pad, may_be_ours,
 };
 
-/// Takes a message of the vehicle into its model.
+/// Applies a message to the vehicle that sent it.
 pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
-    if hear_foreign(vehicle, message, now) {
+    if apply_foreign(vehicle, message, now) {
         return;
     }
-    vehicle.boot.hear(message);
-    vehicle.told.update(message);
-    vehicle.keep(message, now);
+    vehicle.boot.note(message);
+    vehicle.reported.update(message);
+    vehicle.store(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => {
             vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
         }
         MavMessage::TD_FLIGHT_STATUS(_) => {
-            vehicle.status = vehicle.told.status().map(|status| Sample::new(status.clone(), now));
+            vehicle.status = vehicle.reported.status().map(|status| Sample::new(status.clone(), now));
             vehicle.note_checks();
         }
         MavMessage::ATTITUDE_QUATERNION(data) => {
@@ -49,8 +49,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         MavMessage::GLOBAL_POSITION_INT(data) => {
             vehicle.hud = Some(Sample::new(Motion::of_global(data), now));
-            // Until the vehicle tells its pad. The two positions are at most a quarter of a second
-            // apart.
+            // Until the vehicle reports its pad. The two positions are at most a quarter of a
+            // second apart.
             vehicle.pad = vehicle.pad.or_else(|| {
                 let motion = vehicle.motion?.value;
                 Some(Degrees::of_e7(data.lat, data.lon)?.moved(-motion.x_m, -motion.y_m))
@@ -76,7 +76,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         MavMessage::TD_FINDING(data) => vehicle.findings.take(data, name(&data.text[..])),
         _ => {}
     }
-    // The flight may have passed unheard: what comes after it shows that it was.
+    // The flight may have passed in silence: a later phase shows that it took place.
     match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
         Some(true) if vehicle.verdict().is_none() => {
             (vehicle.left_pad_at, vehicle.has_lifted) = (None, false);
@@ -85,8 +85,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             let since = *vehicle.left_pad_at.get_or_insert(now);
             let climbs =
                 |motion: Sample<Motion>| motion.received_at >= since && motion.value.climb_m_s > MOVES_M_S;
-            let is_lit = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
-            vehicle.has_lifted |= !is_lit || vehicle.best_motion().is_some_and(climbs);
+            let is_boosting = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+            vehicle.has_lifted |= !is_boosting || vehicle.best_motion().is_some_and(climbs);
         }
         None => {}
     }
@@ -96,7 +96,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
 /// within a tenth of a second.
 const MOVES_M_S: f64 = 1.0;
 
-// What is converted when it is asked for.
+// Values converted on access.
 impl Vehicle {
     pub fn fins(&self) -> Option<Sample<[Deflection; 4]>> {
         self.converted(|data: &TD_FINS_DATA| {
@@ -129,7 +129,7 @@ impl Vehicle {
         }))
     }
 
-    /// Whether it says that its own log does not run.
+    /// Whether it reports that its log does not run.
     pub fn log_has_stopped(&self) -> bool {
         self.is_unhealthy(MavSysStatusSensor::MAV_SYS_STATUS_LOGGING)
     }
@@ -169,12 +169,12 @@ impl Vehicle {
     }
 }
 
-/// Takes a message of another autopilot. Returns whether it is one: nothing of it is read as a
+/// Applies a message of another autopilot. Returns whether it is one: then it is not read as a
 /// message of our vehicles.
-fn hear_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
+fn apply_foreign(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) -> bool {
     match message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => {
-            // Beside one of ours it is a second vehicle, and what ours tells stays.
+            // Beside one of ours it is a second vehicle, and our vehicle's values stay.
             if vehicle.status.is_none() {
                 *vehicle = Vehicle { boot: std::mem::take(&mut vehicle.boot), ..Vehicle::default() };
                 vehicle.heartbeat = Some(Sample::new(heartbeat(beat), now));
@@ -207,8 +207,8 @@ fn name(bytes: &[u8]) -> String {
     protocol::text::printable(&bytes[..end])
 }
 
-/// Distance, height, vertical and lateral speed, tilt and rate at touchdown, as both messages tell
-/// them.
+/// Distance, height, vertical and lateral speed, tilt and rate at touchdown, in the order of both
+/// messages.
 fn touchdown(at: [f32; 6], violated: TdLimit) -> Touchdown {
     let [distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s] = at.map(f64::from);
     Touchdown { distance_m, height_m, vertical_m_s, lateral_m_s, tilt_rad, rate_rad_s, violated }
@@ -255,15 +255,15 @@ mod tests {
     #[test]
     fn the_time_since_the_release_never_goes_back() {
         let mut vehicle = Vehicle::default();
-        let mut hear = |countdown_ms| {
+        let mut receive = |countdown_ms| {
             let status = TD_FLIGHT_STATUS_DATA { boot_number: 7, countdown_ms, ..Default::default() };
             apply(&mut vehicle, &MavMessage::TD_FLIGHT_STATUS(status), NOW);
             vehicle.status.as_ref().map(|status| status.value.countdown_ms)
         };
-        assert_eq!(hear(2_000), Some(2_000));
-        assert_eq!(hear(-22_100), Some(-22_100));
-        assert_eq!(hear(-21_200), Some(-22_100), "the contact is told a second later");
-        assert_eq!(hear(10_000), Some(10_000), "a new countdown");
+        assert_eq!(receive(2_000), Some(2_000));
+        assert_eq!(receive(-22_100), Some(-22_100));
+        assert_eq!(receive(-21_200), Some(-22_100), "the contact is reported a second later");
+        assert_eq!(receive(10_000), Some(10_000), "a new countdown");
     }
 
     #[test]
@@ -305,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn every_phase_number_of_the_dialect_is_known_and_no_other() {
+    fn every_phase_number_of_the_dialect_is_accepted_and_no_other() {
         for number in 0..=12 {
             assert_eq!(phase_from_number(number).map(|phase| phase as u32), Some(number));
         }

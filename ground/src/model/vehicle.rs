@@ -13,8 +13,8 @@ use protocol::motion::Degrees;
 use protocol::reported::ReportedState;
 
 use super::{
-    Attitude, BodySpeed, Boot, Deflection, KeepAway, Motion, NorthEastUp, PadCheck, ToldChecks, Touchdown,
-    Trend,
+    Attitude, BodySpeed, Boot, Deflection, KeepAway, Motion, NorthEastUp, PadCheck, ReportedChecks,
+    Touchdown, Trend,
 };
 
 /// A value older than this is marked as stale.
@@ -33,7 +33,7 @@ impl<T> Sample<T> {
         Self { value, received_at: now }
     }
 
-    /// Converts the value and keeps its time.
+    /// Converts the value; its time stays.
     pub fn map<U>(self, read: impl FnOnce(&T) -> U) -> Sample<U> {
         Sample { value: read(&self.value), received_at: self.received_at }
     }
@@ -51,7 +51,7 @@ impl<T> Sample<T> {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heartbeat {
-    /// Whether the vehicle says that it is armed: the only source for it.
+    /// Whether the vehicle reports that it is armed: the only source for it.
     pub armed: bool,
     /// The phase, unless its number is unknown.
     pub phase: Option<TdPhase>,
@@ -79,11 +79,11 @@ pub struct Prediction {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Battery {
     pub volts: f64,
-    /// What is left, percent; `None` if the vehicle does not know.
+    /// Remaining charge, percent; `None` if the vehicle does not estimate it.
     pub percent: Option<u8>,
 }
 
-/// `TD_MISSION`: what it flies, and where the flight begins if it tells that.
+/// `TD_MISSION`: the mission that it flies, and where the flight begins if it reports that.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FlownMission {
     pub hash: MissionHash,
@@ -116,12 +116,12 @@ pub struct Vehicle {
     pub(super) payloads: BTreeMap<u32, Sample<Vec<u8>>>,
     pub heartbeat: Option<Sample<Heartbeat>>,
     pub status: Option<Sample<TD_FLIGHT_STATUS_DATA>>,
-    /// What it has told of its arming checks in words.
-    pub(super) checks: ToldChecks,
+    /// Its texts about its arming checks.
+    pub(super) checks: ReportedChecks,
     pub attitude: Option<Sample<Attitude>>,
     pub motion: Option<Sample<Motion>>,
-    /// What goes into the log's record of it.
-    pub told: ReportedState,
+    /// The state for the log's record.
+    pub reported: ReportedState,
     /// `GLOBAL_POSITION_INT`: height above the pad and climb, for a vehicle that sends no local
     /// position.
     pub hud: Option<Sample<Motion>>,
@@ -134,7 +134,7 @@ pub struct Vehicle {
     pub operators: BTreeMap<u8, (TdRole, String)>,
     /// `TD_PAD_CHECK`: the last check on the pad.
     pub pad_check: Option<PadCheck>,
-    /// `TD_FINDING`: what the vehicle says went wrong in its flight.
+    /// `TD_FINDING`: what went wrong in its flight, as the vehicle reports it.
     pub findings: Findings,
     /// The recent change of its velocity.
     pub trend: Trend,
@@ -143,22 +143,21 @@ pub struct Vehicle {
     /// Its flight computer was reset in this flight.
     pub reset_in_flight: bool,
     pub left_pad_at: Option<Duration>,
-    /// It was seen to move since then: a motor that was commanded to light may not have lit.
+    /// It has moved since then: a motor may fail to ignite on command.
     pub has_lifted: bool,
     /// The present boot of the vehicle.
     pub boot: Boot,
-    /// What was said of approaching before a power cycle, and when: a waiting time goes on through
-    /// a boot.
+    /// The warning before a power cycle, and its time: a waiting time runs on through a boot.
     pub(crate) before: Option<Sample<KeepAway>>,
     /// The heartbeat of a vehicle with another autopilot under this id.
     pub foreign: Option<Sample<HEARTBEAT_DATA>>,
 }
 
-/// What the vehicle says went wrong in its flight, as far as it has arrived.
+/// What went wrong in the flight, as far as the vehicle's reports have arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Findings {
-    /// How many there are; `None` if the vehicle has not said so, which it does after the flight if
-    /// there is none.
+    /// Number of findings; `None` if not reported. Without findings the vehicle reports 0 after the
+    /// flight.
     pub count: Option<u8>,
     /// When each began, s since the release, and a short sentence, by its place.
     arrived: BTreeMap<u8, (f64, String)>,
@@ -191,7 +190,7 @@ impl Vehicle {
         Some(Sample::new(message, payload.received_at))
     }
 
-    /// Where the landing motor is to be lit, and what is steered by until then.
+    /// The planned ignition and the estimates that steer the descent.
     pub fn descent(&self) -> Option<Sample<TD_DESCENT_DATA>> {
         self.last()
     }
@@ -201,7 +200,7 @@ impl Vehicle {
         self.last().map(|limits| limits.value)
     }
 
-    pub(super) fn keep(&mut self, message: &MavMessage, now: Duration) {
+    pub(super) fn store(&mut self, message: &MavMessage, now: Duration) {
         let mut payload = [0; 255];
         let len = message.ser(MavlinkVersion::V2, &mut payload);
         self.payloads.insert(message.message_id(), Sample::new(payload[..len].to_vec(), now));
@@ -221,7 +220,7 @@ impl Vehicle {
         self.phase().map(|phase| phase.value)
     }
 
-    /// Whether it says that it is armed; no before it has said anything.
+    /// Whether it reports that it is armed; false before its first heartbeat.
     pub fn is_armed(&self) -> bool {
         self.armed().is_some_and(|armed| armed.value)
     }
@@ -245,7 +244,7 @@ impl Vehicle {
         self.interlocks().is_some_and(|locks| locks.contains(interlock))
     }
 
-    /// Whether the landing motor can still be lit: no latch forbids it. Unknown counts as no.
+    /// Whether the landing motor can still ignite: no latch forbids it. Unknown counts as no.
     pub fn may_light(&self) -> bool {
         let never = TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED
             | TdInterlock::TD_INTERLOCK_ABORT_LATCHED
@@ -264,7 +263,7 @@ impl Vehicle {
         self.countdown_s().is_some_and(|left| left.value > 0.0)
     }
 
-    /// Time to release, s (negative after it), if a countdown is known.
+    /// Time to release, s (negative after it), if a countdown is reported.
     pub fn countdown_s(&self) -> Option<Sample<f64>> {
         let status = self.status.as_ref()?;
         let known = status.value.countdown_ms != i32::MAX;
@@ -272,10 +271,10 @@ impl Vehicle {
     }
 
     /// The time before the release, s, from which on no key and no silence holds the countdown;
-    /// `None` if the vehicle does not tell it.
+    /// `None` if the vehicle does not report it.
     pub fn last_hold_s(&self) -> Option<f64> {
-        let told_ds = self.status.as_ref()?.value.last_hold_ds;
-        (told_ds > 0).then(|| f64::from(told_ds) / 10.0)
+        let reported_ds = self.status.as_ref()?.value.last_hold_ds;
+        (reported_ds > 0).then(|| f64::from(reported_ds) / 10.0)
     }
 
     /// Position and velocity, from the better of its two sources.
@@ -291,25 +290,25 @@ impl Vehicle {
 
     /// Vertical speed, up, m/s; from the same source.
     pub fn vertical_m_s(&self) -> Option<Sample<f64>> {
-        let told = self.of_descent(|descent| descent.vertical_speed_m_s);
-        better(self.of_motion(|motion| motion.climb_m_s), told, STALE_AFTER)
+        let reported = self.of_descent(|descent| descent.vertical_speed_m_s);
+        better(self.of_motion(|motion| motion.climb_m_s), reported, STALE_AFTER)
     }
 
-    /// A number of `TD_DESCENT`, while it is known.
+    /// A number of `TD_DESCENT`, while it is estimated.
     pub fn of_descent(&self, pick: fn(&TD_DESCENT_DATA) -> f32) -> Option<Sample<f64>> {
         let descent = self.descent()?;
         let sample = Sample::new(f64::from(pick(&descent.value)), descent.received_at);
         Some(sample).filter(|sample| sample.value.is_finite())
     }
 
-    /// The radius of the fence of its mission, m; `None` if it has told none.
+    /// The radius of the fence of its mission, m; `None` if it has reported none.
     pub fn fence_m(&self) -> Option<f64> {
         self.limits().map(|limits| f64::from(limits.fence_m)).filter(|m| m.is_finite() && *m > 0.0)
     }
 
     /// A coordinate of the predicted touchdown. At the beginning of the fall, until the vehicle
-    /// knows its ignition band, it follows from a sink rate of nearly zero and is far off: that
-    /// counts as not known.
+    /// estimates its ignition band, it follows from a sink rate of nearly zero and is far off: that
+    /// counts as not available.
     ///
     /// Under a parachute that does not carry the vehicle yet, a report from before its command is
     /// one of the fall without it.
@@ -337,13 +336,13 @@ impl Vehicle {
         self.of_attitude(|attitude| attitude.tilt_rad.to_degrees())
     }
 
-    /// Time from now until the landing motor is to be lit, s. It keeps counting between two
-    /// messages. `None` if the motor will not be lit, or the time has passed.
+    /// Time from now until the planned ignition, s. It counts on between two messages. `None` if
+    /// the motor is inhibited, or the time has passed.
     pub fn ignition_in_s(&self, now: Duration) -> Option<Sample<f64>> {
         count_down(self.of_descent(|d| d.time_to_ignition_s).filter(|_| self.may_light())?, now)
     }
 
-    /// Time from now until the predicted touchdown, s; it also keeps counting.
+    /// Time from now until the predicted touchdown, s; it also counts on between messages.
     pub fn touchdown_in_s(&self, now: Duration) -> Option<Sample<f64>> {
         count_down(self.prediction?.map(|prediction| prediction.time_to_go_s), now)
     }
@@ -369,9 +368,9 @@ fn better<T>(first: Option<Sample<T>>, other: Option<Sample<T>>, by: Duration) -
     }
 }
 
-fn count_down(told_s: Sample<f64>, now: Duration) -> Option<Sample<f64>> {
-    let left_s = told_s.value - told_s.age(now).as_secs_f64();
-    (left_s.is_finite() && left_s >= 0.0).then_some(Sample { value: left_s, ..told_s })
+fn count_down(reported_s: Sample<f64>, now: Duration) -> Option<Sample<f64>> {
+    let left_s = reported_s.value - reported_s.age(now).as_secs_f64();
+    (left_s.is_finite() && left_s >= 0.0).then_some(Sample { value: left_s, ..reported_s })
 }
 
 /// Whether a phase lies between leaving the pad and coming to rest.
@@ -380,7 +379,7 @@ pub fn is_flight(phase: TdPhase) -> bool {
         || phase == TdPhase::TD_PHASE_CHUTE
 }
 
-/// Whether the landing motor burns or is being lit.
+/// Whether the landing motor burns or is being ignited.
 pub fn is_burning(phase: TdPhase) -> bool {
     matches!(phase, TdPhase::TD_PHASE_IGNITION | TdPhase::TD_PHASE_POWERED)
 }

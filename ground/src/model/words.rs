@@ -35,11 +35,11 @@ pub fn event_of(phase: TdPhase) -> Option<&'static str> {
     })
 }
 
-/// What an event says to the crew; `None` if it tells them nothing that other events or the state
-/// do not. The log keeps its own words.
+/// The text of an event for the crew; `None` if other events or the state show the same. The log
+/// stores the original.
 pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
     if let Some(phases) = text.strip_prefix("phase ") {
-        // The vehicle itself says what lights, and on the pad the crew does it.
+        // The vehicle reports ignitions itself, and on the pad the crew commands the phase.
         let to = phase_from_name(phases.rsplit(' ').next()?)?;
         return (to != TdPhase::TD_PHASE_BOOST && !is_on_pad(to)).then(|| phase(to).into());
     }

@@ -42,12 +42,12 @@ pub struct Recording {
     pub phases: Arc<[(TdPhase, Duration)]>,
     /// Why reading ended early, if it did.
     pub damage: Option<String>,
-    /// The vehicle that is shown: the chosen one, otherwise the first that was heard.
+    /// The shown vehicle: the chosen one, otherwise the first received one.
     pub vehicle: Option<Address>,
 }
 
 impl Recording {
-    /// Reads a log once for the flight of this vehicle (`None`: the first that was heard). What has
+    /// Reads a log once for the flight of this vehicle (`None`: the first received one). What has
     /// the content of a `.tlog` is read as such, everything else as MCAP.
     ///
     /// # Errors
@@ -170,7 +170,7 @@ enum Side {
 }
 
 /// A log that is being read from its beginning. The addresses of vehicle and ground are the first
-/// that are heard, unless given.
+/// received, unless given.
 struct LogEvents {
     format: Format,
     vehicle: Option<Address>,
@@ -189,7 +189,7 @@ enum Format {
 }
 
 impl LogEvents {
-    /// Starts at the beginning of an open file, for this vehicle or the first that is heard. What
+    /// Starts at the beginning of an open file, for this vehicle or the first received one. What
     /// has the content of a `.tlog` is read as such, everything else as MCAP.
     fn begin(file: &File, vehicle: Option<Address>) -> io::Result<Self> {
         let mut file = file.try_clone()?;

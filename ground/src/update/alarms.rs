@@ -1,4 +1,4 @@
-//! Which conditions raise alarms, and with which text; and what is called out.
+//! The conditions of each alarm with its text, and the callouts.
 
 use std::time::Duration;
 
@@ -28,8 +28,8 @@ const NOTHING_SENT_SHOWN: Duration = Duration::from_secs(10);
 /// How long a reboot holds as an alarm condition.
 const REBOOT_SHOWN: Duration = Duration::from_secs(10);
 
-/// An alarm: what it is about, how urgent it is, whether it belongs to one boot of the vehicle and
-/// ends with it, and its words while it holds.
+/// An alarm: its kind, its urgency, whether it belongs to one boot of the vehicle and ends with it,
+/// and its text while its condition holds.
 struct AlarmRow {
     kind: AlarmKind,
     urgency: u8,
@@ -37,8 +37,8 @@ struct AlarmRow {
     holds: fn(&Model, Duration) -> Option<String>,
 }
 
-// What hides what: an abort that does not work, then whether this screen and its vehicle are what
-// they seem, then the vehicle, then everything else.
+// Urgency, which decides which alarm hides another: an abort that does not work, then the identity
+// of station and vehicle, then the vehicle, then everything else.
 const ABORT: u8 = 3;
 const WHO: u8 = 2;
 const VEHICLE: u8 = 1;
@@ -52,7 +52,7 @@ const fn of_boot(kind: AlarmKind, urgency: u8, holds: fn(&Model, Duration) -> Op
     AlarmRow { kind, urgency, ends_with_boot: true, holds }
 }
 
-/// The alarms of the station, its link and its log. A silent station says nothing about the link.
+/// The alarms of the station, its link and its log. A silent station is no evidence about the link.
 const OF_STATION: [AlarmRow; 15] = [
     of_run(AlarmKind::NothingSent, ABORT, |model, now| {
         model.nothing_sent_at.filter(|at| now.saturating_sub(*at) < NOTHING_SENT_SHOWN)?;
@@ -62,7 +62,7 @@ const OF_STATION: [AlarmRow; 15] = [
         let gone = "STATION GONE: this screen shows the past and commands nothing (q leaves)";
         let silent = "STATION SILENT: it does not answer this screen, which shows the past";
         let silence = model.link.station_silence(now).map(|_| silent.to_owned());
-        if model.link.station_gone { Some(gone.to_owned()) } else { silence }
+        if model.link.station_lost { Some(gone.to_owned()) } else { silence }
     }),
     of_boot(AlarmKind::Unanswered(CommandKind::Abort), ABORT, |model, now| {
         model.link.why_abort_not_sent(now).map(|why| format!("ABORT NOT SENT: {why}"))
@@ -75,7 +75,8 @@ const OF_STATION: [AlarmRow; 15] = [
         Some(format!("TWO VEHICLES under id {id}: also {other}; {what}"))
     }),
     of_run(AlarmKind::Foreign, WHO, |model, now| {
-        let version = "ANOTHER VERSION: the vehicle is heard, but its messages do not fit this station's; take one version on both";
+        let version =
+            "ANOTHER VERSION: the vehicle's messages do not fit this station's; use one version on both";
         let named = |beat| format!("NOT A TOUCHDOWN VEHICLE: {}", foreign_name(beat));
         let foreign = model.vehicle.as_foreign().map(named);
         let foreign = foreign.or_else(|| model.speaks_another_version(now).then(|| version.to_owned()));
@@ -95,27 +96,27 @@ const OF_STATION: [AlarmRow; 15] = [
         Some(format!("STARTED BY {which}: hold or abort"))
     }),
     of_run(AlarmKind::LinkLost, VEHICLE, |model, now| {
-        let is_lost = matches!(model.link.state(model.link.known_until(now)), LinkState::Lost(_));
-        is_lost.then(|| "LINK LOST: the vehicle is not heard".to_owned())
+        let is_lost = matches!(model.link.state(model.link.valid_until(now)), LinkState::Lost(_));
+        is_lost.then(|| "LINK LOST: no telemetry".to_owned())
     }),
     of_run(AlarmKind::UplinkLost, VEHICLE, |model, now| {
-        let why = || model.link.uplink.why_unheard();
-        let unheard = is_unheard(model, model.link.known_until(now));
-        unheard.then(|| format!("UPLINK LOST: the vehicle does not hear this station; {}", why()))
+        let why = || model.link.uplink.why_not_received();
+        let is_lost = is_uplink_lost(model, model.link.valid_until(now));
+        is_lost.then(|| format!("UPLINK LOST: the vehicle does not receive this station; {}", why()))
     }),
     of_boot(AlarmKind::MayBeFlying, WHO, |model, now| {
-        may_have_left(&model.vehicle, model.link.known_until(now))?;
+        may_have_left(&model.vehicle, model.link.valid_until(now))?;
         let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
-        Some(format!("MAY BE IN THE AIR: not heard since T-{left_s:.1} s"))
+        Some(format!("MAY BE IN THE AIR: no telemetry since T-{left_s:.1} s"))
     }),
-    of_run(AlarmKind::Signatures, VEHICLE, |model, now| refused_frames(model, model.link.known_until(now))),
+    of_run(AlarmKind::Signatures, VEHICLE, |model, now| refused_frames(model, model.link.valid_until(now))),
     of_run(AlarmKind::LinkDown, VEHICLE, |model, _| {
         model.link.trouble.as_ref().map(|why| format!("LINK DOWN: {why}"))
     }),
     of_boot(AlarmKind::AbortBefore, ABORT, |model, _| {
-        model.abort_before.as_ref().map(|at| format!("ABORT asked at {at} NOT CONFIRMED: ask again?"))
+        model.abort_before.as_ref().map(|at| format!("ABORT requested at {at} NOT CONFIRMED: abort again?"))
     }),
-    of_run(AlarmKind::Log, OTHER, |model, now| match model.station_log(model.link.known_until(now)) {
+    of_run(AlarmKind::Log, OTHER, |model, now| match model.station_log(model.link.valid_until(now)) {
         LogStanding::Unfit(_, words) | LogStanding::Warned(words) => Some(format!("STATION LOG {words}")),
         LogStanding::None | LogStanding::Fine => None,
     }),
@@ -139,7 +140,7 @@ const OF_VEHICLE: [AlarmRow; 14] = [
     of_boot(AlarmKind::Battery, OTHER, |model, _| battery(model)),
     of_boot(AlarmKind::VehicleLog, OTHER, |model, _| vehicle_log(model)),
     of_boot(AlarmKind::Position, OTHER, |model, _| position(model)),
-    // The arming checks do not see everything that a check on the pad sees.
+    // The arming checks cover less than a check on the pad.
     of_boot(AlarmKind::CheckFailed, OTHER, |model, _| {
         let on_pad = [TdPhase::TD_PHASE_PAD_IDLE, TdPhase::TD_PHASE_PAD_ARMED].map(Some);
         let check = model.vehicle.pad_check.as_ref().filter(|_| on_pad.contains(&model.vehicle.phase_now()));
@@ -148,7 +149,7 @@ const OF_VEHICLE: [AlarmRow; 14] = [
     of_boot(AlarmKind::Aborted, VEHICLE, |model, _| latch_words(model)),
     of_boot(AlarmKind::NoLight, VEHICLE, |model, _| {
         let no_light = model.vehicle.shows(TdInterlock::TD_INTERLOCK_NO_LIGHT);
-        no_light.then(|| "NO LIGHT: the motor did not light".to_owned())
+        no_light.then(|| "NO LIGHT: the motor did not ignite".to_owned())
     }),
     of_boot(AlarmKind::NotLanded, OTHER, |model, now| {
         let ending = Ending::of(&model.vehicle, now).filter(|ending| *ending != Ending::Stands)?;
@@ -160,8 +161,8 @@ const OF_VEHICLE: [AlarmRow; 14] = [
     }),
     of_boot(AlarmKind::Degraded, OTHER, |model, now| {
         let upright = controller(model, now)?.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER;
-        let lit_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
-        let is_late = now.saturating_sub(lit_at) >= FIRST_PLAN_WITHIN;
+        let ignited_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
+        let is_late = now.saturating_sub(ignited_at) >= FIRST_PLAN_WITHIN;
         (upright && is_late).then(|| "DEGRADED: the stabiliser flies".to_owned())
     }),
     of_boot(AlarmKind::PlanOutside, OTHER, |model, _| {
@@ -186,7 +187,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
         if alarm.what.urgency == WHO || alarm.what.kind == AlarmKind::UplinkLost {
-            model.say(now, Speaker::Ground, EventLevel::Error, alarm.what.text.clone());
+            model.add_event(now, Speaker::Ground, EventLevel::Error, alarm.what.text.clone());
         }
         model.outbox.push(Action::Alarm(alarm.what.text));
     }
@@ -200,23 +201,22 @@ fn other_station(model: &Model) -> Option<String> {
     is_unnamed.then(|| sender_words(model, &format!("{system_id}/{component_id}")))
 }
 
-/// Whether the vehicle is heard and is known not to hear this station.
-fn is_unheard(model: &Model, now: Duration) -> bool {
-    // A report from before a silence says nothing about the present: the vehicle has this long to
-    // report.
-    let heard_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
-    let silent = !model.link.uplink.state(now).carries() && heard_for > RED_AFTER;
+/// Whether telemetry arrives and shows that the vehicle does not receive this station.
+fn is_uplink_lost(model: &Model, now: Duration) -> bool {
+    // A report from before a silence is out of date: the vehicle has this long to send another.
+    let received_for = model.link.alive_since.map_or(Duration::ZERO, |at| now.saturating_sub(at));
+    let silent = !model.link.uplink.state(now).carries() && received_for > RED_AFTER;
     // While nothing is received, an alarm that holds stays.
-    let told = match model.link.state(now) {
+    let may_judge = match model.link.state(now) {
         LinkState::Alive(_) => true,
         LinkState::Doubtful(_) => {
             let mut alarms = model.alarms.list().iter();
             alarms.any(|alarm| alarm.what.kind == AlarmKind::UplinkLost && alarm.is_active())
         }
-        LinkState::NeverHeard | LinkState::Lost(_) => false,
+        LinkState::NeverReceived | LinkState::Lost(_) => false,
     };
     // Another autopilot owes us no report.
-    silent && told && model.vehicle.as_foreign().is_none()
+    silent && may_judge && model.vehicle.as_foreign().is_none()
 }
 
 fn command_conditions(model: &Model, now: Duration, found: &mut Vec<Condition>) {
@@ -254,13 +254,13 @@ fn burns(model: &Model) -> bool {
     model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_POWERED) && model.vehicle.verdict().is_none()
 }
 
-/// What the controller says of itself under thrust.
+/// The controller's state under thrust.
 fn controller(model: &Model, now: Duration) -> Option<TD_CONTROLLER_DATA> {
     let controller = model.vehicle.last().filter(|controller| burns(model) && !controller.is_stale(now));
     controller.map(|controller| controller.value)
 }
 
-/// A battery below the vehicle's own limit, which it tells on its pad; or nearly empty, anywhere.
+/// A battery below the vehicle's limit, reported on its pad; or nearly empty, anywhere.
 fn battery(model: &Model) -> Option<String> {
     let battery = model.vehicle.battery()?.value;
     let refuses = fails(model, TdCheck::TD_CHECK_BATTERY);
@@ -286,14 +286,14 @@ fn position(model: &Model) -> Option<String> {
     } else {
         model.vehicle.last().is_some_and(is_unknown).then_some("POSITION")?
     };
-    Some(format!("{lost} LOST: the position may be off by {:.0} m", model.heard_error_m()))
+    Some(format!("{lost} LOST: the position may be off by {:.0} m", model.position_error_m()))
 }
 
 /// Before the self-test is over a log may still be about to begin.
 fn vehicle_log(model: &Model) -> Option<String> {
     let phase = model.vehicle.phase_now().filter(|phase| *phase != TdPhase::TD_PHASE_SAFE)?;
     if !is_on_pad(phase) {
-        let words = "VEHICLE LOG has stopped: this flight is not recorded whole";
+        let words = "VEHICLE LOG has stopped: this flight is not recorded completely";
         return model.vehicle.log_has_stopped().then(|| words.to_owned());
     }
     if fails(model, TdCheck::TD_CHECK_LOG) {
@@ -304,12 +304,12 @@ fn vehicle_log(model: &Model) -> Option<String> {
     fails(model, TdCheck::TD_CHECK_LOG_SPACE).then(|| format!("VEHICLE LOG has too little space{space}"))
 }
 
-/// Whether the vehicle says that it fails this check; it says so on its pad only.
+/// Whether the vehicle reports that it fails this check; it reports so on its pad only.
 fn fails(model: &Model, check: TdCheck) -> bool {
     model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.contains(check))
 }
 
-// What is called out: as a line of text to the crew's voice, or as bells without one.
+// Callouts: a line of text to the crew's voice command, or bells without one.
 
 /// Heights are called out in these steps, m: above the limit, and below it.
 const HIGH_STEP_M: f64 = 50.0;
@@ -320,19 +320,19 @@ const EVENT: u8 = 1;
 const WATCH: u8 = 2;
 const WRONG: u8 = 3;
 
-/// How much is called out with it, its words, and its bells. It is said anew when what stands
-/// before a colon changes.
+/// The amount from which it is called out, its words, and its bells. It is repeated when the words
+/// before a colon change.
 type Callout = (Amount, String, u8);
 type Present = fn(&Model, Duration) -> Option<Callout>;
 
-/// A state is called out when it changes, and stays while it is not known; anything else as soon as
-/// it is so.
+/// A state is called out when it changes, and persists while it is unknown; anything else is called
+/// out as soon as it holds.
 const STATE: bool = true;
-const NEWS: bool = false;
+const ONCE: bool = false;
 
 /// The callouts but for phases and heights.
 const CALLOUTS: [(bool, Present); 5] = [
-    (NEWS, |model, _| {
+    (ONCE, |model, _| {
         let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
         lifts.then(|| (Amount::Few, "liftoff".to_owned(), WATCH))
     }),
@@ -344,33 +344,33 @@ const CALLOUTS: [(bool, Present); 5] = [
         Some(why_no_go(model, now).map_or_else(|| (Amount::Normal, "go".to_owned(), 0), no_go))
     }),
     // The alarm of the lost link rings by itself.
-    (STATE, |model, now| match model.link.state(model.link.known_until(now)) {
+    (STATE, |model, now| match model.link.state(model.link.valid_until(now)) {
         LinkState::Lost(_) => Some((Amount::Few, "link lost".to_owned(), 0)),
         _ => Some((Amount::Normal, "link restored".to_owned(), 0)),
     }),
-    (NEWS, |model, now| {
+    (ONCE, |model, now| {
         let ending = Ending::of(&model.vehicle, now)?;
         let bells = if ending == Ending::Stands { EVENT } else { WRONG };
         Some((Amount::Few, ending.word().to_lowercase(), bells))
     }),
-    (NEWS, |model, now| {
+    (ONCE, |model, now| {
         let approach = Approach::of(&model.vehicle, now)?;
         Some((Amount::Few, approach.headline().to_lowercase(), EVENT))
     }),
 ];
 
-/// Compares the present state with what was called out.
+/// Compares the present state with the last callouts.
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
     call_height(model, now);
     for (place, (is_state, present)) in CALLOUTS.into_iter().enumerate() {
         let present = present(model, now);
         let about = present.as_ref().and_then(|(_, words, _)| words.split(':').next()).map(str::to_owned);
-        let said = &mut model.called.rows[place];
-        if *said == about || (is_state && about.is_none()) {
+        let called = &mut model.called.rows[place];
+        if *called == about || (is_state && about.is_none()) {
             continue;
         }
-        let before = std::mem::replace(said, about);
+        let before = std::mem::replace(called, about);
         if let Some((amount, words, bells)) = present.filter(|_| !is_state || before.is_some()) {
             call(model, amount, words, bells);
         }
@@ -379,12 +379,12 @@ pub(super) fn call_out(model: &mut Model, now: Duration) {
 
 fn call(model: &mut Model, amount: Amount, text: impl Into<String>, bells: u8) {
     let talk = model.settings.talk;
-    // A screen that attaches late gets the past, and does not repeat it.
+    // A screen that attaches late receives the history, and does not call it out.
     if amount > talk.amount || model.alarms.in_history {
         return;
     }
     if talk.has_voice {
-        model.outbox.push(Action::Say(text.into()));
+        model.outbox.push(Action::CallOut(text.into()));
     } else if amount == Amount::Few {
         model.called.bells_left = model.called.bells_left.max(bells);
     }
@@ -395,7 +395,7 @@ fn call_phase(model: &mut Model) {
     let Some(before) = model.called.phase.replace(phase).filter(|before| *before != phase) else { return };
     let climbed = matches!(before, TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST);
     match phase {
-        TdPhase::TD_PHASE_BOOST => call(model, Amount::Normal, "commanded to light", 0),
+        TdPhase::TD_PHASE_BOOST => call(model, Amount::Normal, "ignition commanded", 0),
         TdPhase::TD_PHASE_CHUTE => call(model, Amount::Few, "parachute", WRONG),
         TdPhase::TD_PHASE_IGNITION => call(model, Amount::Few, "ignition", WATCH),
         TdPhase::TD_PHASE_TOUCHDOWN => call(model, Amount::Few, "touchdown", WATCH),

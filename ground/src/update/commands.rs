@@ -1,4 +1,4 @@
-//! Decides whether a command is sent, and follows it: sent, answered or given up, observed. The
+//! Decides whether a command is sent, and tracks it: sent, answered or given up, observed. The
 //! automatic mode and the unattended countdown give their commands here too.
 
 use std::time::Duration;
@@ -18,11 +18,11 @@ use crate::model::{
 /// Of the many attempts of an abort, only the first and every n-th become an event.
 const ABORT_REPORTED_EVERY: u32 = 100;
 
-/// The crew goes on without the station's log. That it did is recorded wherever something still
-/// records: in the vehicle's log by the station's book, and on every screen.
+/// The crew continues without the station's log. That is recorded wherever something still records:
+/// in the vehicle's log by the station's book, and on every screen.
 pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
     let LogStanding::Unfit(fault, words) = model.station_log(now) else {
-        return model.info(now, "the station's log is fit: nothing to go on without");
+        return model.info(now, "the station's log is fit: nothing to overrule");
     };
     if let Some(why) = why_not_seat(model, by) {
         return model.warn(now, format!("not without a log: {why}"));
@@ -30,21 +30,21 @@ pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
     model.without_log = Some(fault);
     let text =
         format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
-    model.tell_act(now, "without log", by, EventLevel::Warning, text);
+    model.report_action(now, "without log", by, EventLevel::Warning, text);
 }
 
-/// The crew arms a motor that no burn of its lot has confirmed. Who did is recorded as for
+/// The crew arms a motor that no burn of its lot has confirmed. The operator is recorded as for
 /// [`without_log`]; it counts until the vehicle's next power-up.
 pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
     let Some(why) = why_untested(model) else {
-        return model.info(now, "burns confirm the motor, or it was overruled: nothing to go on with");
+        return model.info(now, "burns confirm the motor, or it was overruled: nothing to overrule");
     };
     if let Some(why) = why_not_seat(model, by) {
         return model.warn(now, format!("not with an untested motor: {why}"));
     }
     model.untested = model.vehicle.boot.number();
     let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
-    model.tell_act(now, "untested motor", by, EventLevel::Warning, text);
+    model.report_action(now, "untested motor", by, EventLevel::Warning, text);
 }
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already
@@ -56,22 +56,24 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         CommandKind::Arm => already_sent(model, kind, now).or_else(|| why_not_arm(model, now)),
         CommandKind::Start => already_sent(model, kind, now).or_else(|| why_not_start(model, now)),
         CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
-            let none = || "nobody of another role asks for it".to_owned();
+            let none = || "no operator of another role requests it".to_owned();
             let start = kind == CommandKind::ConfirmStart;
-            let ask = model.ask_to_confirm(now).filter(|ask| (ask.act == TdAct::TD_ACT_START) == start);
-            ask.map_or_else(|| Some(none()), |ask| why_not_confirm(model, &ask, now))
+            let proposal = model
+                .proposal_to_confirm(now)
+                .filter(|proposal| (proposal.act == TdAct::TD_ACT_START) == start);
+            proposal.map_or_else(|| Some(none()), |proposal| why_not_confirm(model, &proposal, now))
         }
         CommandKind::TakeCommand => why_not_take(model, now),
         CommandKind::Tap => {
             let ours = model.tapping(now).is_some_and(|(by, _)| by == model.key_number());
-            let none = || (!ours).then(|| "no tap of this operator is waited for".to_owned());
+            let none = || (!ours).then(|| "no tap of this operator is due".to_owned());
             why_nothing_moves(model, now).or_else(none)
         }
         CommandKind::Seen => why_not_seen(model, now),
         CommandKind::Check | CommandKind::CheckStill => {
             already_sent(model, kind, now).or_else(|| why_not_check(model, now))
         }
-        // It would cut the motors of somebody else's vehicle.
+        // It would cut the motors of another vehicle.
         CommandKind::Disarm if model.vehicle.as_foreign().is_some() => why_nothing_moves(model, now),
         CommandKind::Disarm | CommandKind::Hold | CommandKind::Abort | CommandKind::EndCheck => None,
     };
@@ -84,7 +86,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         None => submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.row().name.to_lowercase(), by.in_brackets());
-            model.tell_act(now, "not sent", by, EventLevel::Warning, text);
+            model.report_action(now, "not sent", by, EventLevel::Warning, text);
         }
     }
 }
@@ -95,7 +97,7 @@ fn already_sent(model: &Model, kind: CommandKind, now: Duration) -> Option<Strin
     Some(format!("{} is already on its way{}", kind.row().name, track.by.in_brackets()))
 }
 
-/// Sends a command to the vehicle and starts to follow it.
+/// Sends a command to the vehicle and starts to track it.
 pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Duration) {
     let commands = &mut model.commands;
     let aborting = commands.is_aborting();
@@ -115,7 +117,7 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
     }
     if kind == CommandKind::Abort && model.beside(now).is_some() {
         let id = model.settings.vehicle.system_id;
-        model.warn(now, format!("the ABORT goes to every vehicle that is heard under id {id}"));
+        model.warn(now, format!("the ABORT goes to every vehicle received under id {id}"));
     }
     let commands = &mut model.commands;
     // An abort that is commanded again while it is being sent is sent at once, and its attempts
@@ -142,10 +144,13 @@ pub(super) fn submit(model: &mut Model, kind: CommandKind, by: Seat, now: Durati
 
 fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let CommandRow { mav: (command, param1), moves, resend, .. } = kind.row();
-    // A confirmation names the ask that it confirms; without a number it would be another ask.
+    // A confirmation names its proposal; without a number it would be a new proposal.
     let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
-    let number = model.ask_to_confirm(now).filter(|_| confirms).map_or(0.0, |ask| f32::from(ask.number));
-    // An arm says for which mission: the vehicle refuses it if it flies another one.
+    let number = model
+        .proposal_to_confirm(now)
+        .filter(|_| confirms)
+        .map_or(0.0, |proposal| f32::from(proposal.number));
+    // An arm names its mission: the vehicle refuses it if it flies another one.
     let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
     let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 3], MissionHash::to_params);
     let [param4, param5, param6] = mission;
@@ -183,7 +188,7 @@ fn track_of(model: &mut Model, command: u16) -> Option<&mut TrackedCommand> {
 
 fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
     // With several links the event names the one that carried the answer.
-    let over = model.link.heard_over().map_or_else(String::new, |link| format!(", over {link}"));
+    let over = model.link.received_over().map_or_else(String::new, |link| format!(", over {link}"));
     let track = match event {
         CommandEvent::Sent { command, .. }
         | CommandEvent::InProgress { command, .. }
@@ -217,15 +222,22 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
         CommandEvent::Answered { result, open, .. } | CommandEvent::AnsweredLate { result, open, .. } => {
-            let asked = open && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
-            track.acknowledged =
-                if asked { Acknowledgement::Asked } else { Acknowledgement::Answered(result) };
+            let awaits_confirmation = open && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+            track.acknowledged = if awaits_confirmation {
+                Acknowledgement::AwaitsConfirmation
+            } else {
+                Acknowledgement::Answered(result)
+            };
             track.acknowledged_at = Some(now);
             answered = (!open).then_some(result);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
-            if asked {
-                ("asked", EventLevel::Info, format!("{name} asked{late}: another role must confirm{over}"))
+            if awaits_confirmation {
+                (
+                    "requested",
+                    EventLevel::Info,
+                    format!("{name} requested{late}: another role must confirm{over}"),
+                )
             } else if track.accepted() {
                 ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}{over}"))
             } else {
@@ -237,16 +249,16 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
         }
     };
-    let told = if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
-    model.record_operator(now, operator_kind, &seat, &told);
-    model.tell(now, Speaker::Ground, level, text);
+    let detail =
+        if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
+    model.record_operator(now, operator_kind, &seat, &detail);
+    model.list_event(now, Speaker::Ground, level, text);
     if let Some(result) = answered {
         on_final_answer(model, kind, result, now);
     }
 }
 
-/// After a temporary refusal, what the vehicle reports about its checks is accepted only after
-/// this.
+/// After a temporary refusal, the vehicle's report about its checks is accepted only after this.
 const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Duration) {
@@ -277,7 +289,7 @@ fn on_final_answer(model: &mut Model, kind: CommandKind, result: u8, now: Durati
 /// until it has been refused permanently.
 fn stop_if_confirmed(model: &mut Model, now: Duration) {
     let confirmed = model.commands.of(CommandKind::Abort).filter(|track| track.is_confirmed());
-    // Of two vehicles under one id it is not known which one has answered.
+    // Of two vehicles under one id either may have answered.
     let confirmed = confirmed.filter(|_| model.beside(now).is_none());
     if let Some(ticket) = confirmed.map(|track| track.ticket) {
         model.commands.sender.withdraw_one(ticket, now);
@@ -300,19 +312,19 @@ pub(super) fn restart_after_reboot(model: &mut Model, now: Duration) -> Vec<&'st
 
 /// Compares the vehicle's own state with the commands.
 pub(super) fn observe(model: &mut Model, now: Duration) {
-    let mut told = Vec::new();
+    let mut changes = Vec::new();
     let flies = model.vehicle.in_flight();
     let Commands { sender, tracks } = &mut model.commands;
     for track in tracks {
         let CommandRow { name, seen, resend, moves, .. } = track.kind.row();
-        // What is repeated until its answer ends when it can no longer help. That its effect shows
+        // A command repeated until its answer ends when it can no longer help. An observed effect
         // is no answer: an arming may still be on its way.
         let repeats = resend == Resend::UntilAnswered && track.acknowledged == Acknowledgement::Waiting;
         if repeats && flies {
             sender.withdraw_one(track.ticket, now);
             track.acknowledged = Acknowledgement::GivenUp;
             let text = format!("{name} TOO LATE: the vehicle flies, and has not acknowledged it");
-            told.push((EventLevel::Error, track.by.clone(), text));
+            changes.push((EventLevel::Error, track.by.clone(), text));
             continue;
         }
         // Then the effect is that of another station's command.
@@ -337,10 +349,10 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         } else {
             continue;
         };
-        told.push((level, track.by.clone(), text));
+        changes.push((level, track.by.clone(), text));
     }
-    for (level, by, text) in told {
-        model.tell_act(now, "observed", &by, level, text);
+    for (level, by, text) in changes {
+        model.report_action(now, "observed", &by, level, text);
     }
     // A refusal counts only when it arrives: it may be another vehicle's.
     if model.commands.of(CommandKind::Abort).is_some_and(|track| track.observed_at.is_some()) {
@@ -359,10 +371,10 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     if !model.settings.auto || !model.link.down(now).carries() {
         return;
     }
-    let is_live = model.vehicle.boot.has_said_what_it_is() && !model.vehicle.boot.is_simulated();
+    let is_live = model.vehicle.boot.is_identified() && !model.vehicle.boot.is_simulated();
     if model.auto_step != AutoStep::Done && is_live {
         let why = "the vehicle is live: it does not report that it is simulated";
-        model.say(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
+        model.add_event(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
         model.auto_step = AutoStep::Done;
         model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
         return;
@@ -463,10 +475,10 @@ const HOLD_EVERY: Duration = Duration::from_millis(100);
 /// Half of the tick period: ticks are not exact to the millisecond.
 const HALF_A_TICK: Duration = Duration::from_millis(50);
 
-/// Why this station is not fit to command a countdown.
+/// Why this station is unfit to command a countdown.
 fn why_unfit(model: &Model, now: Duration) -> Option<StationHold> {
     match model.unfit_log(now) {
-        _ if !model.settings.auto && model.crew.is_gone(now) => Some(StationHold::NoScreen),
+        _ if !model.settings.auto && model.crew.is_absent(now) => Some(StationHold::NoScreen),
         _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => Some(StationHold::TwoVehicles),
         None | Some((LogFault::Full, _)) => None,
         Some(_) => Some(StationHold::LogFails),
@@ -476,18 +488,18 @@ fn why_unfit(model: &Model, now: Duration) -> Option<StationHold> {
 pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
     let unfit = why_unfit(model, now);
     let Some(why) = unfit.filter(|_| counts_down(model) && model.link.uplink.armed_by_us) else {
-        if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_told) {
-            let why = if unfit.is_some() { "the countdown has ended" } else { "its reason is gone" };
+        if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_reported) {
+            let why = if unfit.is_some() { "the countdown has ended" } else { "its reason has ended" };
             model.info(now, format!("the hold is no longer sent: {why}"));
         }
         return;
     };
     let too_late = model.is_past_hold(now);
-    if model.crew.hold_due.is_none() || (too_late && !model.crew.too_late_told) {
-        model.crew.too_late_told = too_late;
+    if model.crew.hold_due.is_none() || (too_late && !model.crew.too_late_reported) {
+        model.crew.too_late_reported = too_late;
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
         let text = format!("{} in the countdown: {what}", why.words());
-        model.tell_act(now, "hold", &Seat::default(), EventLevel::Warning, text);
+        model.report_action(now, "hold", &Seat::default(), EventLevel::Warning, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if too_late {
@@ -503,7 +515,7 @@ fn counts_down(model: &Model) -> bool {
     on_pad && model.vehicle.countdown_s().is_some()
 }
 
-/// Sends a command once, without following it.
+/// Sends a command once, without tracking it.
 pub(super) fn send_once(model: &mut Model, kind: CommandKind, param2: f32) {
     let CommandRow { mav: (command, param1), moves, .. } = kind.row();
     model.outbox.push(Action::send(MavMessage::COMMAND_LONG(COMMAND_LONG_DATA {

@@ -15,12 +15,11 @@ use crate::model::{Model, Role, Speaker, StatusReport, is_busy, may_be_ours, tel
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
-/// A station that the vehicle heard this recently, ms, still counts as one that uses our address.
+/// Maximum age, ms, of a frame by which another station still counts as using our address.
 const SAME_ID_WITHIN_MS: u16 = 5_000;
-/// The vehicle tells of a station for 5 s after it has ended. The rest is for the report and its
-/// way.
+/// The vehicle reports a station for 5 s after it has ended. The rest is for the report's latency.
 const OUR_PAST_FOR: Duration = Duration::from_secs(7);
-/// How many other systems are remembered, so that each is reported once.
+/// Number of other systems that are stored, so that each is reported once.
 const STRANGERS_MAX: usize = 8;
 
 pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
@@ -30,7 +29,7 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
             && let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode()
         {
             if let Some(test) = &mut model.range_test {
-                test.hear_radio(&radio);
+                test.note_radio(&radio);
             }
             model.link.radio = Some((radio, now));
         }
@@ -44,7 +43,7 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
         }
     } else if frame.source() == model.settings.vehicle {
         on_vehicle_frame(model, frame, now);
-        // After what the frame says: it may show that the abort is latched.
+        // After the frame is applied: it may show that the abort is latched.
         if model.commands.sender.on_received(now) {
             commands::poll(model, now);
         }
@@ -64,7 +63,7 @@ fn note_stranger(model: &mut Model, source: Address, now: Duration) {
 }
 
 fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
-    model.link.heard_at = Some(now);
+    model.link.last_frame_at = Some(now);
     if let Some(answer) = CommandAnswer::from_frame(frame) {
         if model.settings.us.accepts(answer.target) {
             commands::on_answer(model, answer, now);
@@ -76,23 +75,23 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
         return;
     };
     let named = boot_of(frame);
-    // Of somebody who has not said yet who it is only texts are taken, and that another autopilot
-    // beats.
-    let is_nobodys = match &message {
+    // From a sender that is not identified yet, only texts and another autopilot's heartbeat are
+    // accepted.
+    let is_unidentified = match &message {
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => false,
         MavMessage::TD_FLIGHT_STATUS(_) | MavMessage::STATUSTEXT(_) => false,
         message => {
-            // Our heartbeats always name a boot: without one it is another's.
+            // Our vehicles' heartbeats always name a boot: one without is another vehicle's.
             let named = named.or(matches!(message, MavMessage::HEARTBEAT(_)).then_some(0));
             named.is_some_and(|boot| model.boots.is_stray(boot))
                 || model.boots.is_strange(model.link.source, now)
         }
     };
-    if is_nobodys {
+    if is_unidentified {
         return;
     }
     // Which vehicle has sent it, and since which power-up; `None` before the first flight status.
-    let speaker = match &message {
+    let sender = match &message {
         MavMessage::TD_FLIGHT_STATUS(status) => {
             let report = StatusReport {
                 uid: status.vehicle_uid,
@@ -104,18 +103,18 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             if model.boots.disowns(&report, now) {
                 return;
             }
-            Some(model.boots.hear(&report, now))
+            Some(model.boots.identify(&report, now))
         }
-        // What another autopilot says beside ours is noted at the shown one.
+        // Another autopilot's heartbeat beside ours is stored with the shown vehicle.
         MavMessage::HEARTBEAT(beat) if !may_be_ours(beat) => model.boots.shown(),
         message => {
-            let said = (named, time_boot_ms(message), frame.sequence());
-            model.boots.speaker(model.link.source, said, now)
+            let evidence = (named, time_boot_ms(message), frame.sequence());
+            model.boots.sender(model.link.source, evidence, now)
         }
     };
-    if let Some(other) = speaker.filter(|boot| model.boots.shown() != Some(*boot)) {
-        // Answers and texts are the crew's, whoever sends them; all else of another vehicle is kept
-        // beside.
+    if let Some(other) = sender.filter(|boot| model.boots.shown() != Some(*boot)) {
+        // Answers and texts go to the crew, whoever sends them; all else of another vehicle is
+        // stored beside.
         if !matches!(message, MavMessage::STATUSTEXT(_)) {
             let vehicle = model.others.entry(other).or_default();
             telemetry::apply(vehicle, &message, now);
@@ -132,13 +131,13 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             }
             return;
         }
-        MavMessage::TD_BOOK_KEPT(data) => return vehicle_changes::on_kept(model, data),
+        MavMessage::TD_BOOK_KEPT(data) => return vehicle_changes::on_book_confirmed(model, data),
         MavMessage::TD_UPLINK(data) => return on_uplink(model, data, now),
         MavMessage::TIMESYNC(data) => return on_timesync(model, data, frame.source(), now),
         MavMessage::HEARTBEAT(_) => {
             model.link.first_heartbeat_at.get_or_insert(now);
             if std::mem::take(&mut model.link.loss_reported) {
-                model.info(now, "link restored: the vehicle is heard again");
+                model.info(now, "link restored: telemetry again");
             }
         }
         _ => {}
@@ -163,43 +162,41 @@ pub(super) fn add_vehicle_text(model: &mut Model, text: &Text, now: Duration) {
         let did = if in_flight { vehicle_changes::IN_FLIGHT } else { on_pad() };
         vehicle_changes::note_reset(model, did, now);
     }
-    model.vehicle.hear_of_check(&text.text);
+    model.vehicle.note_check_text(&text.text);
     let level = EventLevel::of_severity(text.severity);
-    model.say(now, Speaker::Vehicle, level, text.text.clone());
+    model.add_event(now, Speaker::Vehicle, level, text.text.clone());
 }
 
 /// A report of the vehicle about its uplink. Without a target it concerns every station: the
-/// vehicle has not accepted any frame yet.
-///
-/// A station believes what is said about its own session alone: another station may have its
-/// address. The session is unknown in a replay.
+/// vehicle has not accepted any frame yet. A station accepts a report about its session only:
+/// another station may have its address. The session is unknown in a replay.
 fn on_uplink(model: &mut Model, data: &TD_UPLINK_DATA, now: Duration) {
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     let to_all = target == Address { system_id: 0, component_id: 0 };
     let Model { settings, link, .. } = model;
     if !settings.us.accepts(target) {
-        return link.uplink.overhear(data);
+        return link.uplink.on_other_report(data);
     }
     let is_ours = to_all || data.session == settings.session || settings.role == Role::Replaying;
     let another = data.session != 0 && data.accepted_age_ms <= SAME_ID_WITHIN_MS;
-    // Until then it may be this station before it was started again; the vehicle arms for nobody
-    // meanwhile.
-    let is_told = now >= OUR_PAST_FOR && settings.role != Role::Replaying;
-    if is_told && (data.same_id > 0 || (!is_ours && another)) {
+    // Until then it may be this station before it was started again; meanwhile the vehicle refuses
+    // to arm.
+    let is_past_grace = now >= OUR_PAST_FOR && settings.role != Role::Replaying;
+    if is_past_grace && (data.same_id > 0 || (!is_ours && another)) {
         let age = if is_ours { 0 } else { data.accepted_age_ms };
         let at = now.saturating_sub(Duration::from_millis(age.into()));
         link.same_id_at = link.same_id_at.max(Some(at));
     }
     if is_ours {
-        link.uplink.hear(data, now);
+        link.uplink.on_report(data, now);
     } else {
-        link.uplink.overhear(data);
+        link.uplink.on_other_report(data);
     }
 }
 
 fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Duration) {
     let ours = i64::try_from(now.as_nanos()).unwrap_or(i64::MAX);
-    // A question or answer for another station does not concern us.
+    // A request or answer for another station does not concern us.
     let target = Address { system_id: data.target_system, component_id: data.target_component };
     if !model.settings.us.accepts(target) {
         return;
@@ -211,8 +208,8 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
             target_system: source.system_id,
             target_component: source.component_id,
         })));
-    } else if model.settings.role == Role::Station && !model.link.asked.contains(&data.ts1) {
-        // The answer to another station under our id: it would make this one's news look old.
+    } else if model.settings.role == Role::Station && !model.link.timesync_stamps.contains(&data.ts1) {
+        // The answer to another station under our id: with it, new telemetry would look old.
     } else if let Some(nanoseconds) = ours.checked_sub(data.ts1).and_then(|round| u64::try_from(round).ok()) {
         let round_trip = Duration::from_nanos(nanoseconds);
         // A longer time belongs to a request that was given up.
@@ -221,8 +218,8 @@ fn on_timesync(model: &mut Model, data: &TIMESYNC_DATA, source: Address, now: Du
         }
         if round_trip < Duration::from_secs(10) {
             if let Ok(clock_ns) = u64::try_from(data.tc1) {
-                let asked_at = now.saturating_sub(round_trip);
-                model.link.content.answered(Duration::from_nanos(clock_ns), asked_at, now);
+                let requested_at = now.saturating_sub(round_trip);
+                model.link.content.answered(Duration::from_nanos(clock_ns), requested_at, now);
             }
             model.link.round_trip = Some(round_trip);
             model.link.uplink.answered(now.saturating_sub(round_trip));

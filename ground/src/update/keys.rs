@@ -1,10 +1,11 @@
-//! What the keys of the crew do.
+//! The effects of the crew's keys.
 //!
 //! No single key is dangerous. Arming, starting, and quitting in flight take a letter, a typed word
 //! and Enter; disarming takes a letter and Enter; an abort takes Ctrl-X and Enter (or Ctrl-X
 //! twice); each within a time limit. The abort counts however its keys arrive. Other keys count if
 //! they were typed by hand. Keys that arrive faster may be a paste, or typed over a connection that
-//! delivers them in bunches: what they complete is asked again, except for what holds or disarms.
+//! delivers them in bunches: what they complete needs another confirmation, unless it holds or
+//! disarms.
 
 use std::time::Duration;
 
@@ -37,7 +38,7 @@ pub(super) fn on_keys(model: &mut Model, keys: &[Key], now: Duration) {
     }
 }
 
-/// A paste is dropped: it was meant for another window.
+/// A paste is dropped: it was intended for another window.
 pub(super) fn on_paste(model: &mut Model, now: Duration) {
     model.record_operator(now, "key", &model.settings.seat.clone(), "a paste");
     model.key_timing.pasted(now);
@@ -89,15 +90,15 @@ fn on_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
 /// it.
 fn record_key(model: &mut Model, key: Key, now: Duration) {
     let types = model.pages.entry.is_some() || model.dialog.is_some();
-    let told = match key {
+    let keys_typed = match key {
         Key::Char(letter) if types => return model.pages.word.push(letter),
         _ if model.pages.word.is_empty() => key.name(),
         _ => format!("{} {}", std::mem::take(&mut model.pages.word), key.name()),
     };
-    model.record_operator(now, "key", &model.settings.seat.clone(), &told);
+    model.record_operator(now, "key", &model.settings.seat.clone(), &keys_typed);
 }
 
-/// Swallows what is left of a word that is no longer wanted, and says again why. Returns whether
+/// Swallows the rest of a word that is no longer wanted, and repeats the reason. Returns whether
 /// the key was part of it.
 fn on_rest_of_word(model: &mut Model, key: Key, now: Duration) -> bool {
     let Some(mut rest) = model.rest_of_word.take() else { return false };
@@ -109,7 +110,7 @@ fn on_rest_of_word(model: &mut Model, key: Key, now: Duration) -> bool {
     true
 }
 
-/// Keys that arrive too fast and mean nothing here: a paste.
+/// Keys that arrive too fast and have no meaning here: a paste.
 pub(super) fn drop_run(model: &mut Model, now: Duration) {
     model.key_timing.drop_run();
     if model.key_timing.reports_drop(now) {
@@ -154,8 +155,8 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
     complete || model.abort_chord.is_begun(now)
 }
 
-/// A key while a dialog is open: the next letter of its word, or Enter after the whole word; every
-/// other key cancels it.
+/// A key while a dialog is open: the next letter of its word, or Enter after the complete word;
+/// every other key cancels it.
 fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrigin, now: Duration) {
     let by_hand = touch == KeyOrigin::Typed;
     match key {
@@ -255,7 +256,7 @@ fn refuse_command(model: &mut Model, why: &str, now: Duration) {
     model.warn(now, format!("NOTHING WAS SENT: {why}"));
 }
 
-/// A letter that no key and no word has.
+/// The warning about a letter that no key and no word has.
 fn layout(letter: char) -> String {
     format!("KEYBOARD LAYOUT: {letter} is no key here; change to Latin letters")
 }
@@ -263,7 +264,7 @@ fn layout(letter: char) -> String {
 fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
     let act = Act::of_key(key);
     model.key_timing.hurried = touch != KeyOrigin::Typed;
-    if model.key_timing.hurried && !act.is_some_and(|act| act.only_shows_or_asks(model)) {
+    if model.key_timing.hurried && !act.is_some_and(|act| act.is_harmless(model)) {
         return drop_run(model, now);
     }
     if let Some(act) = act {
@@ -285,7 +286,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
         Key::PageDown => scroll(model, -SCROLL_PAGE),
         Key::Home => scroll(model, isize::MAX),
         Key::End => scroll(model, -isize::MAX),
-        Key::Char(letter) if Act::meant_as_capital(letter).is_some() => {
+        Key::Char(letter) if Act::of_small_letter(letter).is_some() => {
             let [arm, start, disarm] = [Act::Arm, Act::Start, Act::Disarm].map(Act::key_name);
             let words = format!("capital letters: {arm} arms, {start} starts, {disarm} disarms (caps lock?)");
             model.info(now, words);
@@ -370,7 +371,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::MovePin if act.works(model, now) => {
             let is_out = model.vehicle.shows(TdInterlock::TD_INTERLOCK_PIN_OUT);
-            model.info(now, if is_out { "somebody puts the pin in" } else { "somebody pulls the pin" });
+            model.info(now, if is_out { "a person puts the pin in" } else { "a person pulls the pin" });
             model.outbox.push(Action::MovePin(!is_out));
         }
         Act::MovePin => {
@@ -388,7 +389,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Note if act.works(model, now) => {
             model.pages.entry = Some(TextEntry::default());
         }
-        Act::Note => model.info(now, "this screen only looks on; it keeps no notes"),
+        Act::Note => model.info(now, "this screen only looks on; it records no notes"),
         Act::Palette => {
             model.pages.entry = Some(TextEntry { chosen: Some(0), ..TextEntry::default() });
         }
@@ -398,8 +399,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
     }
 }
 
-/// Opens the dialog of a rung of the ladder, or the one that overrules what alone is in the way. If
-/// it is refused, the word that the crew would have typed is swallowed.
+/// Opens the dialog of a rung of the ladder, or the one that overrules the only obstacle. If it is
+/// refused, the word that the crew would have typed is swallowed.
 fn open_unless(model: &mut Model, prompt: Prompt, verb: &str, why_not: Option<String>, now: Duration) {
     let Some(why) = why_not else { return open(model, prompt, now) };
     if let Some(overrules) = overruled_by(model, &why, now) {
@@ -426,12 +427,14 @@ fn open(model: &mut Model, prompt: Prompt, now: Duration) {
     model.dialog = Some(prompt.open(now));
 }
 
-/// Opens the dialog that confirms what another operator asks, if one does. Two people who press the
-/// same key at the same moment both ask: the vehicle takes the first ask, and the other one hears
-/// of it.
+/// Opens the dialog that confirms another operator's proposal, if there is one. If two people press
+/// the same key at the same moment, the vehicle accepts the first proposal and reports it to the
+/// other.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
-    let Some(ask) = model.ask_to_confirm(now).filter(|ask| ask.act == act) else { return false };
-    open_unless(model, Prompt::Confirm(ask), "confirm", why_not_confirm(model, &ask, now), now);
+    let Some(proposal) = model.proposal_to_confirm(now).filter(|proposal| proposal.act == act) else {
+        return false;
+    };
+    open_unless(model, Prompt::Confirm(proposal), "confirm", why_not_confirm(model, &proposal, now), now);
     true
 }
 
@@ -454,7 +457,7 @@ fn scroll(model: &mut Model, up: isize) {
     model.pages.scroll = model.pages.scroll.saturating_add_signed(away).min(SCROLL_MAX);
 }
 
-/// Does what the crew has asked for and tells the other screens, or asks the station to.
+/// Executes the crew's request and passes it to the other screens, or sends it to the station.
 pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
     if model.settings.role.why_not_command().is_none() {
         model.outbox.push(Action::Request(request.clone()));
@@ -467,7 +470,7 @@ pub(super) fn request(model: &mut Model, request: Request, now: Duration) {
 /// Acknowledges the alarm in the alarm line, or the chosen one of the list.
 fn see_alarm(model: &mut Model, now: Duration) {
     let Some(kind) = model.pointed_at().map(|at| model.alarms.list()[at].what.kind) else { return };
-    // The station does not know of its own silence.
+    // The station cannot detect its own silence.
     if model.settings.role == Role::Attached && kind != AlarmKind::StationSilent {
         model.outbox.push(Action::Request(Request::Acknowledge(kind)));
     } else {
@@ -493,7 +496,7 @@ fn choose_alarm(model: &mut Model, up: bool) {
 }
 
 fn abort(model: &mut Model, now: Duration) {
-    // What it does to somebody else's vehicle has to be read first.
+    // Its effect on another autopilot has to be read first.
     if model.vehicle.as_foreign().is_some() {
         open(model, Prompt::AbortForeign, now);
         return;
@@ -530,9 +533,7 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
         (Key::Enter, Some(chosen)) => {
             let entry = palette_entries(model, &typed, now).into_iter().nth(chosen);
             return match entry.map(|entry| entry.action) {
-                Some(PaletteAction::Act(act))
-                    if model.key_timing.hurried && !act.only_shows_or_asks(model) =>
-                {
+                Some(PaletteAction::Act(act)) if model.key_timing.hurried && !act.is_harmless(model) => {
                     drop_run(model, now);
                 }
                 Some(PaletteAction::Choose(_)) if model.key_timing.hurried => drop_run(model, now),
@@ -549,8 +550,7 @@ fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
     model.pages.entry = Some(TextEntry { typed, chosen });
 }
 
-/// Does what an entry of the palette says. It goes the way of its key, so it never does more than
-/// the key.
+/// Executes an entry of the palette like its key, so that it never does more than the key.
 fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
     match action {
         // Enter has chosen it, and a held Enter would confirm it.
@@ -562,7 +562,7 @@ fn perform_entry(model: &mut Model, action: PaletteAction, now: Duration) {
             None => request(model, Request::Choose(boot), now),
             Some(why) => model.info(now, why),
         },
-        PaletteAction::TellAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
+        PaletteAction::ExplainAbort => model.info(now, "press Ctrl-X, then Enter: only these keys abort"),
         PaletteAction::Plot(quantity) => {
             model.pages.plotted = quantity;
             perform(model, Act::Show(Page::Plot), now);

@@ -1,7 +1,5 @@
 //! Every decision of the ground: one pure function from a message and the time to a changed model
-//! and actions.
-//!
-//! Nothing here reads a clock, a socket or a file. The actions are what the run loop is to do:
+//! and actions. This module reads no clock, socket or file. The actions are tasks for the run loop:
 //! send, record, quit.
 
 pub mod alarms;
@@ -30,20 +28,20 @@ use crate::model::{
 /// The name of a signal, or of another reason to end.
 pub type SignalName = &'static str;
 
-/// A message for the model: an input of the crew, a frame, a state of the links, or a tick.
-///
-/// A station tells its screens what it takes, but for its own keys and its own end, and what only a
-/// replay or an attached screen uses.
+/// A message for the model: an input of the crew, a frame, a state of the links, or a tick. A
+/// station passes its messages to its screens, except its local keys, its end, and the messages
+/// that only a replay or an attached screen uses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Msg {
     Frame(#[serde(with = "frame_bytes")] Frame),
     /// The crew has completed every step of this request on a screen of the station.
-    Asked {
+    Requested {
         request: Request,
         /// The operator and the screen.
         by: Seat,
     },
-    /// Who can command has changed: the seats at screens that answer, and at those that do not.
+    /// The seats that can command have changed: those at screens that answer, and at those that do
+    /// not.
     Crew {
         seats: Vec<Seat>,
         silent: Vec<Seat>,
@@ -53,9 +51,9 @@ pub enum Msg {
     ScreenQuit,
     /// The station has this checklist, in this state.
     Checklist(Box<Checklist>),
-    /// The report of the flight is here, or is not because of this.
+    /// The report of the flight is written, or the reason why not.
     Report(Result<String, String>),
-    /// The last place of the vehicle, kept from before this run of the station.
+    /// The last position of the vehicle, stored before this run of the station.
     Place(Box<LastPlace>),
     /// The station has signed the end of its book.
     Book {
@@ -65,12 +63,12 @@ pub enum Msg {
     },
     /// The station has not signed or voided a step of the checklist; the reason.
     SignRefused(String),
-    /// The terminal is gone; the station keeps running without it.
-    ScreenGone,
+    /// The terminal is lost; the station continues without it.
+    ScreenLost,
     /// The next frame came over this link; sent only if there are several links.
-    HeardOver(usize),
-    /// The next frames come from this place: a number for each link and address.
-    HeardFrom(u16),
+    ReceivedOver(usize),
+    /// The next frames come from this source: a number for each link and address.
+    ReceivedFrom(u16),
     /// The state of each link, once a second and whenever one goes up or down.
     Links {
         /// In the order of their numbers.
@@ -78,7 +76,7 @@ pub enum Msg {
         /// How many frames passed or failed the signature check; `None` without a key.
         signing: Option<SigningCounters>,
     },
-    /// Bytes arrived, whether or not they form whole frames.
+    /// Bytes arrived, whether or not they form complete frames.
     Received {
         bytes: usize,
         /// The framer's counters after these bytes.
@@ -94,9 +92,9 @@ pub enum Msg {
     /// No link works; the reason.
     LinkDown(String),
     /// A warning about the links for the crew.
-    LinkSays(String),
+    LinkWarning(String),
     Log(LogHealth),
-    /// The station's log goes on in these files.
+    /// The station's log continues in these files.
     LogBegins {
         log: String,
     },
@@ -104,11 +102,11 @@ pub enum Msg {
     SimulatorEnded(Option<String>),
     /// Time passes; sent ten times a second.
     Tick,
-    /// What an earlier run of the station, or its screen, has left unfinished.
+    /// The unfinished state of an earlier run of the station, or of its screen.
     Unfinished(Box<Unfinished>),
     // Skipped ones come last: the others are numbered without them.
-    /// What one read of the terminal brought: one key if it was typed by hand, several from a
-    /// paste, a held key or a slow line.
+    /// The keys of one read of the terminal: one if typed by hand, several from a paste, a held key
+    /// or a slow line.
     #[serde(skip)]
     Keys(Vec<Key>),
     /// The terminal reports that text was pasted.
@@ -128,7 +126,7 @@ pub enum Msg {
 impl Msg {
     /// The crew has completed every step of this command.
     pub fn command(kind: CommandKind, by: Seat) -> Self {
-        Self::Asked { request: Request::Command(kind), by }
+        Self::Requested { request: Request::Command(kind), by }
     }
 }
 
@@ -147,13 +145,13 @@ mod frame_bytes {
     }
 }
 
-/// Takes a message into the model and returns what the run loop is to do.
+/// Applies a message to the model and returns the tasks for the run loop.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     match msg {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
-        Msg::Asked { request, by } => on_request(model, request, by, now),
+        Msg::Requested { request, by } => on_request(model, request, by, now),
         Msg::Crew { seats, silent } => {
             model.crew.set_seats(seats, silent, now);
             model.info(now, model.crew.words());
@@ -162,7 +160,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Report(Ok(path)) => model.info(now, format!("the report is written: {path}")),
         Msg::Report(Err(why)) => model.warn(now, format!("the report is not written: {why}")),
         Msg::Place(place) => model.place = Some(*place),
-        Msg::Unfinished(kept) => model.take_unfinished(*kept, now),
+        Msg::Unfinished(unfinished) => model.take_unfinished(*unfinished, now),
         Msg::Book { head, is_signed } => {
             let is_another = model.book.head.is_some_and(|signed| signed.head.book != head.head.book);
             let before = if is_another { BookState::default() } else { model.book };
@@ -176,7 +174,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
                 format!("the screen was quit; {why}, so the station continues: `ground attach` shows it");
             model.warn(now, text);
         }
-        Msg::ScreenGone => {
+        Msg::ScreenLost => {
             model.warn(now, "the terminal is gone: link and log continue; `ground attach` shows them");
         }
         Msg::Frame(frame) => frames::on_frame(model, &frame, now),
@@ -197,21 +195,26 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.warn(now, format!("link down: {why}"));
             model.link.trouble = Some(why);
         }
-        Msg::LinkSays(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
-        Msg::HeardOver(number) => model.link.heard_over = Some(number),
-        Msg::HeardFrom(source) => model.link.source = source,
+        Msg::LinkWarning(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
+        Msg::ReceivedOver(number) => model.link.received_over = Some(number),
+        Msg::ReceivedFrom(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
-        // The log before is complete. What was flown is in it, and not in the one that is replayed
-        // and reported from now on.
+        // The log before is complete. The flight is in it, and not in the one that is replayed and
+        // reported from now on.
         Msg::LogBegins { log } => {
-            model.info(now, format!("the log goes on in {log}"));
+            model.info(now, format!("the log continues in {log}"));
             model.settings.log_path = Some(log);
             model.outcome.started = false;
         }
         Msg::SimulatorEnded(failure) => {
             if let Some(why) = failure {
-                model.say(now, Speaker::Ground, EventLevel::Error, format!("the simulator failed: {why}"));
+                model.add_event(
+                    now,
+                    Speaker::Ground,
+                    EventLevel::Error,
+                    format!("the simulator failed: {why}"),
+                );
                 model.outcome.error = Some(why);
             }
         }
@@ -240,7 +243,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
 
 fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
     if request == Request::Command(CommandKind::Abort) {
-        model.link.abort_asked_at = None;
+        model.link.abort_requested_at = None;
     }
     match request {
         Request::Command(kind) => commands::command(model, kind, &by, now),
@@ -258,12 +261,18 @@ fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
         Request::Untested => commands::untested(model, &by, now),
         Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
         Request::Note(text) => {
-            model.tell_act(now, "note", &by, EventLevel::Info, format!("note{}: {text}", by.in_brackets()));
+            model.report_action(
+                now,
+                "note",
+                &by,
+                EventLevel::Info,
+                format!("note{}: {text}", by.in_brackets()),
+            );
         }
     }
 }
 
-/// Notes on an attached screen that its station runs.
+/// Records on an attached screen that its station runs.
 fn on_station_tick(model: &mut Model, now: Duration) {
     if !matches!(model.settings.role, Role::Attached | Role::Watching) {
         return;
@@ -289,11 +298,16 @@ fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<Signing
 
 fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     if health.failed && !model.log.failed {
-        model.say(now, Speaker::Ground, EventLevel::Error, "the log has failed: nothing more is recorded");
+        model.add_event(
+            now,
+            Speaker::Ground,
+            EventLevel::Error,
+            "the log has failed: nothing more is recorded",
+        );
     }
     if health.removed && !model.log.removed {
-        let text = "somebody has removed the log: what is recorded in it is written anew under its name";
-        model.say(now, Speaker::Ground, EventLevel::Error, text);
+        let text = "the log was removed: its records are written again under its name";
+        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
     }
     if health.dropped > 0 && model.log.dropped == 0 {
         model.warn(now, "the log cannot keep up: records are dropped");

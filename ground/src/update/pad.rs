@@ -1,5 +1,5 @@
-//! What the crew does on the pad: signs and voids steps of the checklist, tests the radio, notes
-//! the vehicle's check.
+//! The crew's actions on the pad: signing and voiding steps of the checklist, the radio test, the
+//! vehicle's check.
 
 use std::time::Duration;
 
@@ -38,7 +38,7 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
             let verb = if void { "voided" } else { "signed" };
             let text = signature_words(model, step, &signature, verb, by);
             let level = if void { EventLevel::Warning } else { EventLevel::Info };
-            model.tell_act(now, verb, by, level, text);
+            model.report_action(now, verb, by, level, text);
         }
         Err(why) => refuse_signature(model, (step, void), by, &why, now),
     }
@@ -52,9 +52,9 @@ fn refuse_signature(model: &mut Model, (step, void): (usize, bool), by: &Seat, w
     on_sign_refused(model, text, now);
 }
 
-/// The station has refused a signature: every screen says why.
+/// The station has refused a signature: every screen shows the reason.
 pub(super) fn on_sign_refused(model: &mut Model, why: String, now: Duration) {
-    model.tell(now, Speaker::Ground, EventLevel::Warning, why.clone());
+    model.list_event(now, Speaker::Ground, EventLevel::Warning, why.clone());
     model.sign_refused = Some((why, now));
 }
 
@@ -71,7 +71,7 @@ fn signature_words(model: &Model, step: usize, signature: &Signature, verb: &str
     format!("checklist step {} {verb} by {role}{who}: {}", step + 1, step_words.unwrap_or_default())
 }
 
-/// What a signature would hold.
+/// The signature that would be stored.
 fn signature(
     model: &Model,
     (number, void): (usize, bool),
@@ -90,7 +90,7 @@ fn signature(
     match (&step.mark, void) {
         (Mark::Signed(_), false) => return Err("it is signed already".to_owned()),
         (Mark::Open | Mark::Voided(_), true) => return Err("it is not signed".to_owned()),
-        // Anybody who may sign at all may take a signature back.
+        // Anyone who may sign at all may take a signature back.
         (Mark::Signed(_), true) => return Ok(signature),
         (Mark::Open | Mark::Voided(_), false) => {}
     }
@@ -125,13 +125,13 @@ fn change_checklist(model: &mut Model, entry: ChecklistEntry) {
     if let Some(list) = &mut model.checklist
         && list.apply(&entry)
     {
-        model.outbox.push(Action::KeepChecklist(entry));
+        model.outbox.push(Action::StoreChecklist(entry));
     }
 }
 
-// The checks on the pad: the radio range test, and what goes into the book.
+// The checks on the pad: the radio range test, and the entries of the book.
 
-/// Begins the radio range test; one that runs goes on.
+/// Begins the radio range test; a running one continues.
 pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     if let Some(why) = why_not_check(model, now) {
         return model.warn(now, format!("no radio range test: {why}"));
@@ -141,11 +141,11 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     }
     let counts = model.link.stats.counts(model.settings.vehicle);
     let text = format!("radio range test begins: 30 s, nothing is commanded{}", by.in_brackets());
-    model.tell_act(now, "radio range test", &by, EventLevel::Info, text);
+    model.report_action(now, "radio range test", &by, EventLevel::Info, text);
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
-/// Lets time pass: questions are sent, and the test ends.
+/// Lets time pass: requests are sent, and the test ends.
 pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     let armed = model.vehicle.is_armed() || model.vehicle.in_flight();
     let counts = model.link.stats.counts(model.settings.vehicle);
@@ -156,36 +156,37 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     let question = test.pass(counts, now);
     let ended = test.found.map(|found| (found, test.by.clone()));
     if let Some(ts1) = question {
-        tick::ask_time(model, ts1);
+        tick::request_time(model, ts1);
     }
     if let Some((found, by)) = ended {
         let level = if found.passed() { EventLevel::Info } else { EventLevel::Warning };
-        model.tell_act(now, "radio range test", &by, level, found.words());
+        model.report_action(now, "radio range test", &by, level, found.words());
     }
 }
 
 /// Enters a check that is over, once every value of it has arrived, with the first values outside
 /// their limits.
 pub(super) fn enter_check(model: &mut Model, now: Duration) {
-    let Some(check) = model.vehicle.pad_check.as_ref().filter(|check| check.is_whole()) else { return };
-    let which = (model.vehicle.boot.number().unwrap_or(0), check.told.run);
+    let Some(check) = model.vehicle.pad_check.as_ref().filter(|check| check.is_complete()) else { return };
+    let which = (model.vehicle.boot.number().unwrap_or(0), check.report.run);
     if model.check_entered == Some(which) {
         return;
     }
-    let (text, passed) = (check_words(check), check.told.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
-    let who = if check.told.asked_by > 0 { model.operator(check.told.asked_by) } else { String::new() };
+    let (text, passed) =
+        (check_words(check), check.report.state == TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
+    let who = if check.report.asked_by > 0 { model.operator(check.report.asked_by) } else { String::new() };
     model.check_entered = Some(which);
     model.enter("check of the vehicle", &who, &text);
     let level = if passed { EventLevel::Info } else { EventLevel::Warning };
-    model.tell(now, Speaker::Ground, level, text);
+    model.list_event(now, Speaker::Ground, level, text);
 }
 
 fn check_words(check: &PadCheck) -> String {
-    let state = words::lower_case(&check.told.state, "TD_PAD_CHECK_STATE_").to_uppercase();
+    let state = words::lower_case(&check.report.state, "TD_PAD_CHECK_STATE_").to_uppercase();
     let failing: Vec<String> = check.failing().map(value_words).collect();
     let outside =
         if failing.is_empty() { String::new() } else { format!(", outside: {}", failing.join("; ")) };
-    format!("check {} {state}: {} values{outside}", check.told.run, check.told.found)
+    format!("check {} {state}: {} values{outside}", check.report.run, check.report.found)
 }
 
 /// A value with its limit, as in `fin 2 range 0.0 deg (least 87.7)`.

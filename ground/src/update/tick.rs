@@ -1,5 +1,4 @@
-//! What happens on each tick: heartbeats, resends, time limits, the loss of the link, the end of a
-//! run.
+//! The work of each tick: heartbeats, resends, time limits, the loss of the link, the end of a run.
 
 use std::time::Duration;
 
@@ -11,22 +10,22 @@ use protocol::log::v1::Telemetry;
 
 use super::{Action, commands, frames, keys, pad, vehicle_changes};
 use crate::model::{
-    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, note_trace, unheard_hints,
+    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, link_hints, note_trace,
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
-/// An armed vehicle holds its countdown if it hears nothing for 1 s. With ten heartbeats in that
+/// An armed vehicle holds its countdown after 1 s without an uplink. With ten heartbeats in that
 /// time and 25 % loss, all are lost once in a million times.
 const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
-/// For a vehicle whose answers are the only proof that it hears this station.
+/// For a vehicle whose answers are the only proof of the uplink.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
-/// How many questions may wait for an answer: of 10 s, one a second and those of a range test.
-const ASKED_MAX: usize = 64;
+/// Number of requests that may wait for an answer: of 10 s, one a second and those of a range test.
+const TIMESYNC_STAMPS_MAX: usize = 64;
 const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
-/// A station that has heard nothing of an armed vehicle for this long says so. The vehicle is to
-/// know it 1 s after the loss: the rest is for the next heartbeat and its way.
+/// Silence of an armed vehicle after which the station reports its downlink as lost. The vehicle
+/// must receive that report 1 s after the loss: the rest is for the next heartbeat's latency.
 const DEAF_AFTER: Duration = Duration::from_millis(800);
 /// Without a screen: how long the program waits for further messages after a flight.
 const WAIT_AFTER_FLIGHT: Duration = Duration::from_secs(2);
@@ -40,22 +39,22 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         keys::pass(model, now);
     }
     heartbeat(model, now);
-    let known = model.link.first_heartbeat_at.is_some();
-    // What seems to be old is measured again soon: the vehicle's clock may have lost time.
+    let has_vehicle = model.link.first_heartbeat_at.is_some();
+    // An age that seems large is measured again soon: the vehicle's clock may have lost time.
     let seems_old = !matches!(model.link.down(now), LinkState::Alive(age) if age < SEEMS_OLD);
     let often = seems_old || !model.link.uplink.is_reported;
     let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
-    if known && is_due(&mut model.due.timesync, timesync_every, now) {
-        ask_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
+    if has_vehicle && is_due(&mut model.due.timesync, timesync_every, now) {
+        request_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
     }
     for text in model.texts.expire(now) {
         frames::add_vehicle_text(model, &text, now);
     }
     note_loss(model, now);
-    if !model.link.unheard_reported
-        && let Some(hints) = unheard_hints(model, now)
+    if !model.link.hints_reported
+        && let Some(hints) = link_hints(model, now)
     {
-        model.link.unheard_reported = true;
+        model.link.hints_reported = true;
         model.warn(now, hints.join(" "));
     }
     note_trace(model, now);
@@ -70,14 +69,14 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     commands::hold_if_unfit(model, now);
     pad::pass_range_test(model, now);
     vehicle_changes::send_book_end(model, now);
-    keep_place(model, now);
-    vehicle_changes::keep_unfinished(model, now);
-    if known && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
+    store_place(model, now);
+    vehicle_changes::store_unfinished(model, now);
+    if has_vehicle && is_due(&mut model.due.telemetry_record, TELEMETRY_RECORD_EVERY, now) {
         let telemetry = Telemetry {
-            link_age_s: model.link.heard_at.map(|at| now.saturating_sub(at).as_secs_f64()),
+            link_age_s: model.link.last_frame_at.map(|at| now.saturating_sub(at).as_secs_f64()),
             link_loss: model.link.loss(now),
             link_rx_bytes_s: Some(model.link.stats.figures(now).rx_bytes_s),
-            ..model.vehicle.told.record(now.as_secs_f64())
+            ..model.vehicle.reported.record(now.as_secs_f64())
         };
         model.outbox.push(Action::Record(Record::Telemetry(Box::new(telemetry))));
     }
@@ -89,10 +88,10 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
 }
 
-/// Asks the vehicle for its time; the answer repeats this stamp, ns.
-pub(super) fn ask_time(model: &mut Model, stamp: i64) {
-    model.link.asked.truncate(ASKED_MAX - 1);
-    model.link.asked.push_front(stamp);
+/// Requests the vehicle's time; the answer repeats this stamp, ns.
+pub(super) fn request_time(model: &mut Model, stamp: i64) {
+    model.link.timesync_stamps.truncate(TIMESYNC_STAMPS_MAX - 1);
+    model.link.timesync_stamps.push_front(stamp);
     model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
         tc1: 0,
         ts1: stamp,
@@ -111,26 +110,26 @@ fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
     true
 }
 
-/// Whether the vehicle must hear this station frequently: it is armed on the pad by nobody else, or
-/// is about to be. A countdown that is no longer heard may still run.
-fn must_be_heard(model: &Model, now: Duration) -> bool {
-    let hears = model.link.state(now).carries();
+/// Whether the vehicle must receive frequent heartbeats: it is armed on the pad, and not by another
+/// station, or is about to be. A countdown may still run after the downlink is lost.
+fn needs_fast_heartbeats(model: &Model, now: Duration) -> bool {
+    let is_received = model.link.state(now).carries();
     let on_pad = model.vehicle.phase_now().is_some_and(is_on_pad);
     let counts = model.vehicle.countdown_s().is_some() && may_have_left(&model.vehicle, now).is_none();
     let armed = model.vehicle.is_armed() && model.link.uplink.armed_by_other.is_none();
-    on_pad && ((armed && (hears || counts)) || (hears && model.dialog.is_some()))
+    on_pad && ((armed && (is_received || counts)) || (is_received && model.dialog.is_some()))
 }
 
-/// Whether this station hears nothing of a vehicle that is armed on the pad, or only what is old.
+/// Whether no telemetry arrives from a vehicle that is armed on the pad, or only stale data.
 fn is_deaf(model: &Model, now: Duration) -> bool {
-    let silent = model.link.heard_at.is_none_or(|at| now.saturating_sub(at) >= DEAF_AFTER);
+    let silent = model.link.last_frame_at.is_none_or(|at| now.saturating_sub(at) >= DEAF_AFTER);
     let old = matches!(model.link.down(now), LinkState::Lost(_));
     model.vehicle.is_armed() && (silent || old)
 }
 
 /// Heartbeats are sent from the run loop, so that a hanging ground station sends none.
 fn heartbeat(model: &mut Model, now: Duration) {
-    let every = if must_be_heard(model, now) { FAST_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
+    let every = if needs_fast_heartbeats(model, now) { FAST_HEARTBEAT_EVERY } else { HEARTBEAT_EVERY };
     if is_due(&mut model.due.heartbeat, every, now) {
         let system_status =
             if is_deaf(model, now) { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
@@ -152,8 +151,8 @@ fn note_loss(model: &mut Model, now: Duration) {
         && !model.link.loss_reported
     {
         model.link.loss_reported = true;
-        let text = format!("LINK LOST: the vehicle is not heard for {:.1} s", age.as_secs_f64());
-        model.say(now, Speaker::Ground, EventLevel::Error, text);
+        let text = format!("LINK LOST: no telemetry for {:.1} s", age.as_secs_f64());
+        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
     }
 }
 
@@ -170,7 +169,7 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
         _ if outcome.aborted_at.is_some_and(past) && on_ground => "the flight was aborted",
         _ if let Some((what, _)) = refused => return Some(format!("refused: {what}")),
         LinkState::Lost(age) if age >= LOST_FOR_GOOD => "the link is lost",
-        LinkState::NeverHeard if model.settings.auto && now >= LOST_FOR_GOOD => "no vehicle was heard",
+        LinkState::NeverReceived if model.settings.auto && now >= LOST_FOR_GOOD => "no vehicle was received",
         _ => {
             let limit = model.settings.time_limit.filter(|limit| now >= *limit)?;
             return Some(format!("time limit: the flight did not end within {:.0} s", limit.as_secs_f64()));
@@ -179,22 +178,22 @@ fn why_end(model: &Model, now: Duration) -> Option<String> {
     Some(why.to_owned())
 }
 
-// Follows the last place of the vehicle, and has it kept, so that a lost vehicle can be found also
-// after a restart.
+// Has the last position of the vehicle stored, so that a lost vehicle can be found also after a
+// restart.
 
-/// How often it is kept in flight.
-const KEPT_EVERY: Duration = Duration::from_secs(2);
+/// How often it is stored in flight.
+const PLACE_STORED_EVERY: Duration = Duration::from_secs(2);
 
-pub(super) fn keep_place(model: &mut Model, now: Duration) {
+pub(super) fn store_place(model: &mut Model, now: Duration) {
     if model.place_due.is_some_and(|due| now < due) {
         return;
     }
-    model.place_due = Some(now + KEPT_EVERY);
+    model.place_due = Some(now + PLACE_STORED_EVERY);
     let Some(place) = model.last_place(now).filter(|place| model.place.as_ref() != Some(place)) else {
         return;
     };
     model.place = Some(place);
     if model.settings.role == Role::Station {
-        model.outbox.push(Action::KeepPlace(Box::new(place)));
+        model.outbox.push(Action::StorePlace(Box::new(place)));
     }
 }

@@ -26,7 +26,7 @@ pub(super) struct Announced {
     aborted: bool,
     hold: Option<TdHold>,
     verdict: Option<Verdict>,
-    /// What it says of its crew and its mission.
+    /// Its reports of its crew and its mission.
     crew: TD_CREW_DATA,
     mission: Option<FlownMission>,
 }
@@ -48,7 +48,7 @@ impl Announced {
         }
     }
 
-    /// What a vehicle did when it was reset.
+    /// The vehicle's state when it was reset.
     pub(super) fn words_of_reset(&self) -> &'static str {
         match self.status {
             Some((TdPhase::TD_PHASE_PAD_ARMED, true)) => " in the countdown",
@@ -59,11 +59,11 @@ impl Announced {
     }
 }
 
-/// How the vehicle says that its flight computer has restarted.
+/// The vehicle's text about a restart of its flight computer.
 pub const RESTARTED: &str = "the flight computer has restarted";
-/// Where it happened, if it was not on the pad.
+/// The end of that text, unless it happened on the pad.
 pub(super) const IN_FLIGHT: &str = " IN FLIGHT";
-/// News of one reset come within this time.
+/// Reports of one reset arrive within this time.
 const ONE_RESET: Duration = Duration::from_secs(5);
 
 /// Shows another boot if one takes the screen.
@@ -85,10 +85,10 @@ pub(super) fn settle(model: &mut Model, now: Duration) {
     on_change(model, &Announced::default(), &after, now);
 }
 
-/// Has what is unfinished kept when it has changed. A demonstration ends with its vehicle.
-pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
+/// Has the unfinished state stored when it has changed. A demonstration ends with its vehicle.
+pub(super) fn store_unfinished(model: &mut Model, now: Duration) {
     model.vehicle.end_before(now);
-    // Asked for again, or seen: the one before is no longer open.
+    // Commanded again, or observed: the one before is no longer open.
     if model.vehicle.interlocks().is_some_and(is_aborted) || model.commands.of(CommandKind::Abort).is_some() {
         model.abort_before = None;
     }
@@ -97,10 +97,10 @@ pub(super) fn keep_unfinished(model: &mut Model, now: Duration) {
     }
     let present = model.unfinished(now);
     // Once a position is stored, nothing is stored explicitly, too: then a missing file shows.
-    let is_missing = model.kept.is_none() && model.place.is_some();
-    if is_missing || present != model.kept.clone().unwrap_or_default() {
-        model.kept = Some(present.clone());
-        model.outbox.push(Action::KeepUnfinished(present));
+    let is_missing = model.stored_unfinished.is_none() && model.place.is_some();
+    if is_missing || present != model.stored_unfinished.clone().unwrap_or_default() {
+        model.stored_unfinished = Some(present.clone());
+        model.outbox.push(Action::StoreUnfinished(present));
     }
 }
 
@@ -112,25 +112,24 @@ pub(super) fn choose(model: &mut Model, boot: u32, by: &Seat, now: Duration) {
         model.warn(now, format!("boot {name} was chosen: it is shown and commanded"));
         settle(model, now);
     } else {
-        let why = "it is not heard, or more than one vehicle has it";
+        let why = "it is not received, or more than one vehicle has it";
         model.warn(now, format!("boot {name} is not chosen: {why}"));
     }
 }
 
-/// The flight computer has restarted within one power-up, as it says, or as a return to its
-/// self-test shows. Both tell of one reset.
+/// The flight computer has restarted within one power-up, by its text, or by a return to its
+/// self-test. Both report one reset.
 pub(super) fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
     if model.rebooted.as_ref().is_some_and(|(_, at)| now.saturating_sub(*at) < ONE_RESET) {
         return;
     }
     let text = format!("the flight computer has restarted{did}");
-    model.say(now, Speaker::Ground, EventLevel::Error, text);
+    model.add_event(now, Speaker::Ground, EventLevel::Error, text);
     model.rebooted = Some((did, now));
     model.outbox.push(Action::SyncLog);
 }
 
-/// Another boot has the screen: after a reset, and what the vehicle did then, or of another
-/// vehicle.
+/// Another boot is shown: after a reset, with the vehicle's state then, or of another vehicle.
 fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     let number = model.vehicle.boot.number();
     let which = number.map_or_else(String::new, |number| format!(", boot {}", words::boot(number)));
@@ -143,11 +142,11 @@ fn on_shown(model: &mut Model, reset: Option<&'static str>, now: Duration) {
     model.history = History::default();
     model.link.uplink = Uplink::default();
     model.link.round_trip = None;
-    // It has its time to report what it hears.
+    // It has time to report its uplink.
     model.link.alive_since = None;
     model.link.content = protocol::link_stats::ContentAge::default();
-    // A vehicle that was switched on again has a new log, which keeps nothing yet.
-    model.book.kept = 0;
+    // A vehicle that was switched on again has a new log, without any entry of the book.
+    model.book.confirmed = 0;
     model.alarms.vehicle_rebooted(now);
     model.rebooted = reset.map(|did| (did, now));
     // An open dialog was opened for the former boot.
@@ -171,7 +170,7 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     {
         model.info(now, if armed { "armed (HEARTBEAT)" } else { "disarmed (HEARTBEAT)" });
     }
-    // Nothing but a restart leads there.
+    // Only a restart leads there.
     let is_in_its_test =
         |status: Option<(TdPhase, bool)>| status.map(|(phase, _)| phase == TdPhase::TD_PHASE_SAFE);
     if (is_in_its_test(before.status), is_in_its_test(after.status)) == (Some(false), Some(true)) {
@@ -188,7 +187,7 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     if after.aborted && !before.aborted {
         model.outcome.aborted_at = Some(now);
         let words = latch_words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
-        model.say(now, Speaker::Ground, EventLevel::Error, format!("the vehicle says {words}"));
+        model.add_event(now, Speaker::Ground, EventLevel::Error, format!("the vehicle reports {words}"));
         model.outbox.push(Action::SyncLog);
     }
     if let Some(verdict) = after.verdict
@@ -199,25 +198,25 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     if after.hold != before.hold
         && let Some(text) = hold_words(&model.vehicle, model.link.uplink.armed_by_us)
     {
-        model.say(now, Speaker::Ground, EventLevel::Error, text);
+        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
         model.outbox.push(Action::SyncLog);
     }
 }
 
 /// Reports whether people may approach, because the log must show when they may not. A waiting time
-/// ends without a word of the vehicle, too.
+/// ends without a message of the vehicle, too.
 pub(super) fn watch_approach(model: &mut Model, now: Duration) {
     let away = KeepAway::of(&model.vehicle, now);
     let approach = Approach::of(&model.vehicle, now);
-    let told = (away.map(|away| away.danger), approach.map(|approach| approach.headline()));
-    if std::mem::replace(&mut model.approach_told, told) == told {
+    let approach_now = (away.map(|away| away.danger), approach.map(|approach| approach.headline()));
+    if std::mem::replace(&mut model.reported_approach, approach_now) == approach_now {
         return;
     }
     match (approach, away) {
         (Some(Approach::May(why)), _) => model.info(now, format!("MAY BE APPROACHED: {why}")),
         (_, Some(away)) => {
             let level = if away.danger == Danger::Hot { EventLevel::Warning } else { EventLevel::Error };
-            model.say(now, Speaker::Ground, level, away.sentence());
+            model.add_event(now, Speaker::Ground, level, away.sentence());
         }
         (Some(Approach::Away(_)) | None, None) => {}
     }
@@ -234,7 +233,7 @@ fn on_phase(model: &mut Model, before: Option<TdPhase>, phase: TdPhase, now: Dur
     }
     model.info(now, format!("phase {from}{}", words::phase(phase)));
     model.outbox.push(Action::SyncLog);
-    // The flight itself may have passed unheard.
+    // The flight itself may have passed in silence.
     let after_it = !is_on_pad(phase) && before.is_some_and(is_on_pad);
     if after_it || (is_flight(phase) && !before.is_some_and(is_flight)) {
         if !model.outcome.started {
@@ -253,21 +252,23 @@ fn on_verdict(model: &mut Model, verdict: &Verdict, now: Duration) {
     let level = if stands { EventLevel::Info } else { EventLevel::Error };
     let ending = Ending::of(&model.vehicle, now);
     let text = ending.map_or_else(String::new, |ending| ending.sentence(&model.vehicle));
-    model.say(now, Speaker::Ground, level, text);
+    model.add_event(now, Speaker::Ground, level, text);
     model.outcome.started = true;
     model.outcome.verdict = Some((stands, now));
     model.outbox.push(Action::SyncLog);
 }
 
-// Tells the vehicle the end of the station's book until it has confirmed it, and enters what the
-// vehicle says of its crew.
+// Sends the vehicle the end of the station's book until it has confirmed it, and enters the
+// vehicle's reports of its crew.
 
 /// How often the end is sent at most.
 const SENT_EVERY: Duration = Duration::from_secs(2);
 
-/// Sends the end again while the vehicle is heard and has not confirmed it.
+/// Sends the end again while telemetry arrives and the vehicle has not confirmed it.
 pub(super) fn send_book_end(model: &mut Model, now: Duration) {
-    let Some(head) = model.book.head.filter(|signed| signed.head.entries > model.book.kept) else { return };
+    let Some(head) = model.book.head.filter(|signed| signed.head.entries > model.book.confirmed) else {
+        return;
+    };
     let due = model.book.sent_at.is_none_or(|at| now.saturating_sub(at) >= SENT_EVERY);
     if due && model.link.state(now).carries() {
         model.book.sent_at = Some(now);
@@ -276,18 +277,18 @@ pub(super) fn send_book_end(model: &mut Model, now: Duration) {
     }
 }
 
-pub(super) fn on_kept(model: &mut Model, kept: &TD_BOOK_KEPT_DATA) {
-    let target = Address { system_id: kept.target_system, component_id: kept.target_component };
+pub(super) fn on_book_confirmed(model: &mut Model, report: &TD_BOOK_KEPT_DATA) {
+    let target = Address { system_id: report.target_system, component_id: report.target_component };
     let ours = model
         .book
         .head
-        .is_some_and(|signed| signed.head.book == kept.book && kept.entries <= signed.head.entries);
+        .is_some_and(|signed| signed.head.book == report.book && report.entries <= signed.head.entries);
     if model.settings.us.accepts(target) && ours {
-        model.book.kept = model.book.kept.max(kept.entries);
+        model.book.confirmed = model.book.confirmed.max(report.entries);
     }
 }
 
-/// Enters what the vehicle says of its crew and its mission, if it has changed.
+/// Enters the vehicle's reports of its crew and its mission, if they have changed.
 pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &Announced, now: Duration) {
     let (mission, former) = (&after.mission, &before.mission);
     let holds = [before, after].map(|state| (state.hold, state.crew.held_by));
@@ -296,10 +297,10 @@ pub(super) fn enter_crew_changes(model: &mut Model, before: &Announced, after: &
     if after.people != before.people {
         lines.push((0, format!("an arming and a start take {} of the crew", after.people)));
     }
-    let ask = |crew: &TD_CREW_DATA| (crew.act, crew.ask_number, crew.asked_by);
-    if after.act != TdAct::TD_ACT_NONE && ask(after) != ask(before) {
+    let proposal = |crew: &TD_CREW_DATA| (crew.act, crew.ask_number, crew.asked_by);
+    if after.act != TdAct::TD_ACT_NONE && proposal(after) != proposal(before) {
         let act = if after.act == TdAct::TD_ACT_START { "start" } else { "arm" };
-        lines.push((after.asked_by, format!("asks to {act} (ask {})", after.ask_number)));
+        lines.push((after.asked_by, format!("requests to {act} (request {})", after.ask_number)));
     }
     let roles = [
         (after.commanded_by, before.commanded_by, "is in command"),

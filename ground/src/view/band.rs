@@ -41,7 +41,7 @@ impl Room {
 /// A word or number with its name.
 #[derive(Debug, Clone)]
 pub struct Item {
-    /// What it is and its unit; may be empty.
+    /// Its name and unit; may be empty.
     pub label: String,
     pub text: String,
     /// Its width; of a number the greatest, so that nothing moves when it changes.
@@ -51,7 +51,7 @@ pub struct Item {
     is_predicted: bool,
 }
 
-/// A word, and what it is.
+/// A word with its label.
 pub fn word(label: &str, text: &str, role: TextRole) -> Item {
     let (label, text) = (label.to_owned(), text.to_uppercase());
     let pixels = columns(&text).count() as u16;
@@ -191,13 +191,13 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
     }
     let (width, halves) = size;
     if item.pixels * width > at.width + width || (theme.ascii && size == NARROW) {
-        // Small halves of a row cannot be told apart in ASCII.
+        // Small halves of a row cannot be distinguished in ASCII.
         let spaced: String = item.text.chars().flat_map(|letter| [letter, ' ']).collect();
         let middle = Rect { y: at.y + 1, height: 1, ..at }.intersection(at);
         return draw_line(frame, middle, Line::styled(spaced, style));
     }
     if item.role == TextRole::Alarm {
-        // Its ground is whole, or the letters look torn.
+        // Its background is one area, or the letters look torn.
         let ground = Rect { width: (item.pixels * width).min(at.width), ..at };
         frame.buffer_mut().set_style(ground, style);
     }

@@ -1,4 +1,4 @@
-//! Values as bars: the limits of a touchdown with their marks, fins and gimbal, supplies.
+//! Values as bars: the limits of a touchdown with their marks, fins and gimbal.
 
 use std::time::Duration;
 
@@ -13,15 +13,15 @@ use super::theme::Ink;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, pages, shortest};
 use crate::model::{Deflection, Gimbal, Model, Sample, Verdict, words};
 
-/// Where the limit stands on a bar, so that an excess can be seen.
+/// Position of the limit on a bar, as a share, so that an excess can be seen.
 const LIMIT_AT: f64 = 0.8;
 /// Columns before the bar of a limit: mark, name and value.
 const BEFORE_BAR: u16 = 19;
 /// Columns of a limit with its unit.
 const LIMIT_COLUMNS: u16 = 11;
-/// The most columns of a bar: a longer one says no more.
+/// Maximum columns of a bar: a longer one shows no more.
 const BAR_COLUMNS: u16 = 30;
-/// The widest panel that has no room for them.
+/// The widest panel without room for the limits.
 const NARROW: u16 = 40;
 
 /// Two marks with their words, at the right end of a title.
@@ -81,7 +81,7 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let at = Rect { y, height: 1, ..inside };
         let table_2 = outside_table_2 && row.value.abs() > row.table_2;
         let (word, word_role) = match () {
-            () if !row.kept => ("NO", TextRole::Alarm),
+            () if !row.is_met => ("NO", TextRole::Alarm),
             () if table_2 => ("T2", TextRole::Caution),
             () if row.limit.is_empty() => ("  ", TextRole::Plain),
             () => ("ok", TextRole::Good),
@@ -117,15 +117,15 @@ pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
         };
         format!("{}/{}", text(|at| at.measured_rad), text(|at| at.commanded_rad))
     };
-    let whole = |deg: f64| format!("{:>2}", fixed(deg, 0));
-    // Of a large deflection the tenth says nothing.
+    let rounded = |deg: f64| format!("{:>2}", fixed(deg, 0));
+    // Of a large deflection the tenth is irrelevant.
     let signed = |deg: f64| {
         let sign = if deg < 0.0 { "" } else { "+" };
         format!("{:>4}", sign.to_owned() + &fixed(deg, usize::from(deg.abs() < 9.95)))
     };
     let (fins, gimbal) = (vehicle.fins(), vehicle.gimbal());
     let each: Vec<String> =
-        (0..4).map(|k| format!("{:>5}", pair(fins.map(|fins| fins.value[k]), whole))).collect();
+        (0..4).map(|k| format!("{:>5}", pair(fins.map(|fins| fins.value[k]), rounded))).collect();
     let phase = vehicle.phase_now().map_or_else(|| "no phase".to_owned(), words::phase);
     let of = |plane: fn(&Gimbal) -> Deflection| {
         format!("{:>9}", pair(gimbal.map(|gimbal| plane(&gimbal.value)), signed))
@@ -169,10 +169,10 @@ pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         ];
         draw_line(frame, at, Line::from_iter(words));
         let share = |deg: f64| (deg - low) / (high - low);
-        let asked = theme.ground().fg(theme.ink(Ink::Predicted));
+        let command_ink = theme.ground().fg(theme.ink(Ink::Predicted));
         let bar_at = Rect { x: at.x + 19, width: at.width.saturating_sub(20), ..at };
         let ink = theme.ground().fg(theme.ink(Ink::Measured));
-        let mark = commanded.map(|deg| (share(deg), asked));
+        let mark = commanded.map(|deg| (share(deg), command_ink));
         bar([share(0.0), measured.map_or(share(0.0), share)], ink, mark, frame, bar_at);
     }
 }

@@ -37,21 +37,23 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
     }
     let cancels = || plain("Any other key cancels.".to_owned());
     let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
-    let own = model.role_of(model.own_number()).filter(|_| model.people() == Some(2));
-    let asks = |own| plain(format!("This only asks: {} must confirm within 10 s.", other_roles(own)));
-    let next = || own.map(asks).into_iter().chain([any_other_key()]);
-    // What stands above and below the line of the word.
+    let ours = model.role_of(model.operator_number()).filter(|_| model.people() == Some(2));
+    let proposes =
+        |ours| plain(format!("This is a request: {} must confirm within 10 s.", other_roles(ours)));
+    let next = || ours.map(proposes).into_iter().chain([any_other_key()]);
+    // The lines above and below the line of the word.
     let (title, above, below) = match dialog.prompt {
         Prompt::Arm => ("ARM, step 2 of 2", Vec::new(), next().chain(checks(model, theme)).collect()),
         Prompt::Start => {
             ("START the countdown", Vec::new(), next().chain(model.loss_in_words().map(plain)).collect())
         }
-        Prompt::Confirm(ask) => {
-            let asks = plain(format!("{} asks to {}.", model.operator(ask.by), ask.act_name()));
-            ("CONFIRM what another operator asks", vec![asks], vec![any_other_key()])
+        Prompt::Confirm(proposal) => {
+            let proposes =
+                plain(format!("{} requests to {}.", model.operator(proposal.by), proposal.act_name()));
+            ("CONFIRM another operator's request", vec![proposes], vec![any_other_key()])
         }
         Prompt::TakeCommand => {
-            let who = plain(format!("{} is in command, if the vehicle hears them.", commander(model)));
+            let who = plain(format!("{} is in command, if the vehicle receives them.", commander(model)));
             ("TAKE COMMAND of an armed vehicle", vec![who], vec![any_other_key()])
         }
         Prompt::AbortForeign => {
@@ -77,7 +79,7 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
             let goes_on = match model.settings.role {
                 Role::Station if model.settings.demonstration => "Quitting ends the demonstration.",
                 Role::Station => "The station continues without a screen: `ground attach` shows it.",
-                _ => "The station continues; a countdown is held once nobody can command.",
+                _ => "The station continues; a countdown is held without a screen that commands.",
             };
             let leaves = "Quitting neither disarms nor aborts. Any other key cancels.";
             let below = [goes_on, leaves].map(|words| plain(words.to_owned()));
@@ -124,9 +126,9 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
 }
 
 /// The other roles that may command.
-fn other_roles(own: TdRole) -> String {
+fn other_roles(ours: TdRole) -> String {
     let all = [TdRole::TD_ROLE_RANGE_SAFETY, TdRole::TD_ROLE_FLIGHT, TdRole::TD_ROLE_PAD];
-    all.into_iter().filter(|role| *role != own).map(role_name).collect::<Vec<_>>().join(" or ")
+    all.into_iter().filter(|role| *role != ours).map(role_name).collect::<Vec<_>>().join(" or ")
 }
 
 /// Who is in command.
@@ -138,31 +140,34 @@ fn commander(model: &Model) -> String {
     }
 }
 
-/// What is asked or waited for, while no dialog is open: it is on every page.
+/// A pending request or tap, while no dialog is open: it is on every page.
 fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let plain = |text: String| theme.line(text, TextRole::Plain);
     let strong = |text: String| theme.line(text, TextRole::Caution);
-    let own = model.own_number();
-    if let Some(ask) = model.ask(now) {
-        let (left_s, act) = (ask.left.as_secs_f64(), ask.act_name());
-        let who = model.operator(ask.by);
-        if ask.by == own && own > 0 {
-            let others = model.role_of(own).map_or_else(String::new, other_roles);
+    let ours = model.operator_number();
+    if let Some(proposal) = model.proposal(now) {
+        let (left_s, act) = (proposal.left.as_secs_f64(), proposal.act_name());
+        let who = model.operator(proposal.by);
+        if proposal.by == ours && ours > 0 {
+            let others = model.role_of(ours).map_or_else(String::new, other_roles);
             let words = format!("{others} must confirm within {left_s:.0} s.");
-            return Some(("ASKED", vec![plain(format!("You ask to {act}.")), strong(words)]));
+            return Some(("REQUESTED", vec![plain(format!("You request to {act}.")), strong(words)]));
         }
-        let key = if ask.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm }.key_name();
-        let words = match model.ask_to_confirm(now) {
+        let key = if proposal.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm }.key_name();
+        let words = match model.proposal_to_confirm(now) {
             Some(_) if why_not_here(model).is_none() => strong(format!(
                 "Press {key} within {left_s:.0} s, then type {CONFIRM_WORD} and Enter to confirm."
             )),
             _ => plain(format!("Another role must confirm within {left_s:.0} s; not this screen.")),
         };
-        return Some(("ANOTHER OPERATOR ASKS", vec![strong(format!("{who} asks to {act}.")), words]));
+        return Some((
+            "ANOTHER OPERATOR'S REQUEST",
+            vec![strong(format!("{who} requests to {act}.")), words],
+        ));
     }
     let (by, left) = model.tapping(now)?;
     let left_s = left.as_secs_f64();
-    if by == own && why_not_here(model).is_none() {
+    if by == ours && why_not_here(model).is_none() {
         let key = Act::Tap.key_name();
         let words = format!("Tap {key}: {left_s:.1} s left, or the countdown is held.");
         return Some(("TAP twice a second", vec![strong(words)]));
@@ -239,7 +244,7 @@ pub fn draw_palette(model: &Model, theme: Theme, now: Duration, frame: &mut Fram
 pub fn palette_lines(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
     let Some(TextEntry { typed, chosen }) = &model.pages.entry else { return Vec::new() };
     let Some(chosen) = chosen else {
-        let keys = theme.label(" Enter keeps it, Esc does not");
+        let keys = theme.label(" Enter records it, Esc does not");
         return vec![Line::from(theme.key(format!(" {typed}_"))), Line::from(keys)];
     };
     let entries = palette_entries(model, typed, now);

@@ -1,5 +1,5 @@
 //! The last rows of every page: an alarm, a message, or the flight along its time; and the keys
-//! that do something now.
+//! that work now.
 
 use std::time::Duration;
 
@@ -10,28 +10,28 @@ use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 
-use super::lists::said;
+use super::lists::crew_events;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Event, KeepAway, Model, Page, dead_reckoning::foreseen, dead_reckoning::is_unheard, is_burning,
-    is_flight, is_on_pad, words,
+    Act, Event, KeepAway, Model, Page, dead_reckoning::is_silent, dead_reckoning::predicted_course,
+    is_burning, is_flight, is_on_pad, words,
 };
 use crate::view::pictures::seconds_since;
 
 /// From this width on the flight has a second row, for the names of its events with their times.
 const TWO_ROWS_COLUMNS: usize = 120;
 
-/// The rows above the keys: an alarm that nobody has seen; else a message, the flight along its
-/// time, or the newest event. While an alarm rings, a message has a row of its own. Where the
-/// flight has two rows, an alarm or a message takes the second.
+/// The rows above the keys: an unacknowledged alarm; else a message, the flight along its time, or
+/// the newest event. While an alarm rings, a message has a row of its own. Where the flight has two
+/// rows, an alarm or a message takes the second.
 pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) -> Vec<Line<'static>> {
     let columns = usize::from(columns);
     let rings = model.alarms.unacknowledged() > 0 && model.playing.is_none();
     let alarm = alarm_text(model, theme, now, columns).filter(|_| rings);
     // In flight nothing moves for it.
     let hidden = alarm.is_some() && model.vehicle.in_flight();
-    // What the alarm says in full has no second row.
+    // A message that the alarm contains needs no second row.
     let alarm_words = alarm.as_ref().map(ToString::to_string).unwrap_or_default();
     let is_new = |message: &Line| !alarm_words.contains(message.to_string().trim());
     let message = top_lines::message(model, theme, now, columns).filter(|words| !hidden && is_new(words));
@@ -46,20 +46,19 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
             let role = if event.level == EventLevel::Info { TextRole::Label } else { TextRole::Plain };
             theme.line(format!(" {:.1} {}{text}", event.at.as_secs_f64(), event.mark().trim_start()), role)
         };
-        over.push(said(model).next().map(line).unwrap_or_default());
+        over.push(crew_events(model).next().map(line).unwrap_or_default());
     }
     over
 }
 
-// The flight along its time: what has been, what is expected, warnings and errors, and the shown
-// moment.
+// The flight along its time: past and expected events, warnings and errors, and the shown moment.
 
-/// How long the line of a flight in progress is, so that it is rarely drawn anew, s.
+/// Lengths of the line of a flight in progress, s, in steps, so that it is rarely redrawn.
 pub const LENGTHS_S: [f64; 10] = [20.0, 30.0, 45.0, 60.0, 120.0, 300.0, 600.0, 1_800.0, 7_200.0, 36_000.0];
 /// The steps of what is expected, in lengths of the line.
 const EXPECTED_STEP: f64 = 1.0 / 40.0;
-/// The mark of the shown moment, of what has been, of what is expected, of a warning or an error;
-/// the time that has passed, and that is to come.
+/// The marks of the shown moment, of a past and an expected event, of a warning or an error; of the
+/// time that has passed, and that is to come.
 const NOW: char = '◆';
 const BEEN: char = '●';
 const EXPECTED: char = '○';
@@ -81,7 +80,7 @@ pub fn shown_until(model: &Model, now: Duration) -> Duration {
     flown.find(|(phase, _)| !is_flight(*phase)).map_or(now, |(_, at)| now.min(*at + STILL_AFTER))
 }
 
-/// What the vehicle has told that will come, with its time.
+/// The events that the vehicle predicts, with their times.
 pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     let vehicle = &model.vehicle;
     let Some(phase) = vehicle.phase_now().filter(|_| vehicle.in_flight()) else { return Vec::new() };
@@ -89,7 +88,7 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
     let ignition = vehicle.ignition_in_s(now).filter(|_| !is_burning(phase));
     let touchdown = vehicle.touchdown_in_s(now).filter(|_| is_burning(phase)).map(|left| left.value);
     let ground = || {
-        let ends = foreseen(vehicle, now).last().copied().filter(|(_, [.., up_m])| *up_m < 1.0)?;
+        let ends = predicted_course(vehicle, now).last().copied().filter(|(_, [.., up_m])| *up_m < 1.0)?;
         Some(seconds_since(ends.0, now))
     };
     let left = [
@@ -98,11 +97,11 @@ pub fn expected(model: &Model, now: Duration) -> Vec<(&'static str, Duration)> {
         ("touchdown", touchdown.or_else(ground)),
     ];
     // After a loss of the link, the expected touchdown may have passed.
-    let known = left.into_iter().filter_map(|(name, left_s)| {
-        let left_s = left_s.filter(|left_s| *left_s >= 0.0 || is_unheard(vehicle, now))?;
+    let upcoming = left.into_iter().filter_map(|(name, left_s)| {
+        let left_s = left_s.filter(|left_s| *left_s >= 0.0 || is_silent(vehicle, now))?;
         Some((name, Duration::try_from_secs_f64(now.as_secs_f64() + left_s).ok()?))
     });
-    known.collect()
+    upcoming.collect()
 }
 
 /// The flight along its time in a row, and from some width on the names in a second one.
@@ -143,11 +142,15 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
         let after = phases.get(place + 1).map(|(phase, _)| *phase);
         let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
-        let is_told = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
+        let is_only_commanded = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
         let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
-        let name = if is_told { "ignition commanded" } else { words::event_of(*phase).filter(|_| !again)? };
+        let name = if is_only_commanded {
+            "ignition commanded"
+        } else {
+            words::event_of(*phase).filter(|_| !again)?
+        };
         Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.
@@ -155,7 +158,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let steady = |at: Duration| {
         let steps = libm::round(at.saturating_sub(from).as_secs_f64() / step_s);
         let at = from + Duration::from_secs_f64(steps * step_s);
-        if is_unheard(&model.vehicle, now) { at } else { at.max(now) }
+        if is_silent(&model.vehicle, now) { at } else { at.max(now) }
     };
     let to_come = to_come.iter().map(|(name, at)| (*name, steady(*at), *at, EXPECTED, Ink::Predicted));
     let reset = model.rebooted.filter(|_| model.vehicle.reset_in_flight);
@@ -165,13 +168,14 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     for (_, at, _, mark, ink) in &marks {
         rows[0][column(*at)] = (*mark, *ink);
     }
-    // A name stands under its mark, else beside it, where nothing else is; without room it goes.
+    // A name is written under its mark, else beside it, in blank cells; without room it is left
+    // out.
     for (name, at, exactly, _, ink) in &marks {
         let begin = column(*at);
         let time_s = seconds_since(*exactly, lift_off);
         let name = if is_wide { format!("{name} {time_s:.1}") } else { (*name).to_owned() };
         let length = name.len();
-        // Before its mark only where that is its alone.
+        // Before its mark only where no other mark is.
         let beside = [(0, Some(begin + 1), 0), (0, begin.checked_sub(length), 1)];
         let under = [(1, Some(begin), 0), (1, (begin + 1).checked_sub(length), 0)];
         let places = under.into_iter().filter(|_| is_wide).chain(beside);

@@ -1,5 +1,5 @@
-//! What must be seen first: the words on approaching and of a flight that does not go as planned,
-//! and the large number or word of each phase.
+//! The headlines: the words on approaching and of a flight that deviates from its plan, and the
+//! large number or word of each phase.
 
 use std::time::Duration;
 
@@ -10,22 +10,22 @@ use super::top_lines::readiness;
 use super::{STALE_MARK, TextRole};
 use crate::model::{
     AlarmKind, Approach, Ending, Model, Sample, Spot,
-    dead_reckoning::{is_unheard, may_have_left, predict_position},
+    dead_reckoning::{is_silent, may_have_left, predict_position},
     hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
 };
 use protocol::dialect::{TdInterlock, TdPhase};
 
-// The largest words of every page, when people may be in danger or have waited for the word: DO NOT
+// The largest words of every page, when people may be in danger or wait for permission: DO NOT
 // APPROACH, ONE PERSON: PIN IN, MAY BE APPROACHED, LIFT-OFF, MAY BE IN THE AIR, LOST. While they
-// stand, no page shows a headline of its own.
+// are shown, no page shows its own headline.
 
-/// What is said of a vehicle that has left the pad, and nobody commanded it.
+/// The words for an uncommanded lift-off.
 const LIFT_OFF: &str = "LIFT-OFF";
 /// A landing motor that was commanded and gave no thrust.
 const NO_LIGHT: &str = "NO LIGHT";
-/// What is said of an abort that its station has not sent.
+/// The words for an abort that its station has not sent.
 const NOT_SENT: &str = "ABORT NOT SENT";
-/// What is said of a vehicle that may have left the pad unheard.
+/// The words for a vehicle that may have left the pad in silence.
 pub const MAY_FLY: &str = "MAY BE IN THE AIR";
 
 /// The words, and a line that gives the reason.
@@ -56,13 +56,13 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
         let lead = format!("{mark}{ending}{}", words.to_lowercase());
         return Some(Banner { words, lead, rest: approach.reason(), role });
     }
-    let commanded_by_nobody = || " that nobody commanded: TAKE COVER, look up".to_owned();
+    let uncommanded = || ", uncommanded: TAKE COVER, look up".to_owned();
     Some(match ending {
         _ if let Some(why) = model.link.why_abort_not_sent(now) => {
             Banner::alarm(NOT_SENT, format!(": {why}"))
         }
         None if may_have_left(vehicle, now).is_some() => may_fly(model),
-        _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, commanded_by_nobody()),
+        _ if is_liftoff_by_itself(vehicle) => Banner::alarm(LIFT_OFF, uncommanded()),
         None if vehicle.in_flight() && vehicle.shows(TdInterlock::TD_INTERLOCK_NO_LIGHT) => {
             let chute = vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
             let then = if chute { "parachute commanded" } else { "no parachute commanded" };
@@ -76,20 +76,20 @@ pub fn banner(model: &Model, now: Duration) -> Option<Banner> {
     })
 }
 
-/// Since when, and where it is meant to come down. The moment stands still; the clock in the line
-/// above runs.
+/// The banner of MAY BE IN THE AIR: since when, and where it should come down. The time is fixed;
+/// the clock in the line above runs.
 fn may_fly(model: &Model) -> Banner {
     let left_s = model.vehicle.countdown_s().map_or(0.0, |left| left.value);
-    let place = match model.meant_to_come_down() {
+    let place = match model.intended_touchdown() {
         Some(Spot { north_m, east_m, error_m }) if libm::hypot(north_m, east_m) < 1.0 => {
-            format!("meant to land within {error_m:.0} m")
+            format!("should land within {error_m:.0} m")
         }
         Some(Spot { north_m, east_m, error_m }) => {
-            format!("meant {north_m:.0} m N, {east_m:.0} m E, within {error_m:.0} m")
+            format!("should land {north_m:.0} m N, {east_m:.0} m E, within {error_m:.0} m")
         }
-        None => "where is not told".to_owned(),
+        None => "no fence reported".to_owned(),
     };
-    Banner::alarm(MAY_FLY, format!(" since T-0, unheard from T-{left_s:.1} s; {place}"))
+    Banner::alarm(MAY_FLY, format!(" since T-0, silent since T-{left_s:.1} s; {place}"))
 }
 
 impl Banner {
@@ -97,7 +97,7 @@ impl Banner {
         Self { words, lead: format!(" {words}"), rest, role: TextRole::Alarm }
     }
 
-    /// The line above the large words, which also says them as text.
+    /// The line above the large words, which repeats them as text.
     pub fn reason(&self) -> String {
         format!("{}{}", self.lead, self.rest)
     }
@@ -110,7 +110,7 @@ impl Banner {
 
 // The large number or word of each phase.
 
-/// Whether the vehicle may be armed; on the way to the start, how far it is.
+/// Whether the vehicle may be armed; after that, the step towards the start.
 pub fn pad(model: &Model, now: Duration) -> Item {
     let (text, role) = pad_word(model, now);
     word("", &text, role)
@@ -132,8 +132,8 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
-    let taps =
-        model.tapping(now).is_some_and(|(by, _)| by == model.own_number()) && why_not_here(model).is_none();
+    let taps = model.tapping(now).is_some_and(|(by, _)| by == model.operator_number())
+        && why_not_here(model).is_none();
     let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
     // A vehicle that was reset while it was armed may do it again.
     let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());
@@ -167,7 +167,7 @@ fn lost(model: &Model, now: Duration) -> (Item, Vec<Item>) {
 pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     use TdPhase as P;
     let vehicle = &model.vehicle;
-    if is_unheard(vehicle, now) {
+    if is_silent(vehicle, now) {
         return lost(model, now);
     }
     let phase = vehicle.phase_now();

@@ -19,15 +19,15 @@ const NARROW_COLUMNS: usize = 50;
 const WRAP_COLUMNS_MIN: usize = 20;
 
 /// The newest events, oldest first, in this many lines of this width. Long texts wrap, because the
-/// end of a refusal is its reason. The newest is whole: if it alone has more lines, its beginning
-/// is drawn.
+/// end of a refusal is its reason. The newest is complete: if it alone has more lines, its
+/// beginning is drawn.
 pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<Line<'static>> {
     // In a narrow panel the speaker is left out.
     let is_narrow = columns < NARROW_COLUMNS;
     let before = if is_narrow { TIME_COLUMNS + 3 } else { BEFORE_TEXT };
     let text_columns = columns.saturating_sub(before);
     let lift_off = flight_began(model);
-    let mut lines: Vec<Vec<Line>> = said(model)
+    let mut lines: Vec<Vec<Line>> = crew_events(model)
         .take(rows)
         .map(|(event, text)| {
             let role = match event.level {
@@ -53,8 +53,8 @@ pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<L
     lines
 }
 
-/// The events that tell the crew something, the newest first, each in the words of the crew.
-pub fn said(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
+/// The events of interest to the crew, the newest first, each in the words of the crew.
+pub fn crew_events(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
     let newest = model.events.newest(usize::MAX).rev();
     newest.filter_map(|event| Some((event, words::of_event(&event.text)?)))
 }
@@ -75,7 +75,7 @@ pub fn wrap(text: &str, columns: usize) -> Vec<String> {
     lines.into_iter().map(Cow::into_owned).collect()
 }
 
-// The checklist as rows: which step counts, who signed it, and the value found.
+// The checklist as rows: the state of each step, its signer, and the value found.
 
 /// Columns of the mark and the number.
 const FRONT_COLUMNS: usize = 9;
@@ -191,7 +191,7 @@ mod tests {
     use crate::view::theme::Palette;
 
     #[test]
-    fn the_newest_event_keeps_its_beginning() {
+    fn the_beginning_of_the_newest_event_is_visible() {
         let mut model = Model::new(Settings::on_screen("udpin:127.0.0.1:14550"));
         let at = Duration::from_secs(7);
         model.events.push(at, Speaker::Vehicle, EventLevel::Info, "SAFED".to_owned());
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_wrap_at_spaces_and_keep_every_character() {
+    fn texts_wrap_at_spaces_without_losing_a_character() {
         assert_eq!(wrap("one two", 20), ["one two"]);
         assert_eq!(wrap("arming refused: pin: found in", 20), ["arming refused: pin:", "found in"]);
         assert_eq!(wrap(&"x".repeat(45), 20).concat().len(), 45);

@@ -2,10 +2,10 @@
 //!
 //! Every page has the same frame: [`top_lines`] (identity, link, recording; the state and what an
 //! abort would do in the colour of the danger), the page, and [`footer`] (the flight along its
-//! time, the keys). [`pages`] has the pages; [`panels`], [`pictures`], [`lists`] and [`widgets`]
-//! are what they are made of. From 80x22 on, the panels are side by side; on smaller terminals
-//! there are plain lines: state, abort, alarm and messages, and the pages that are lines. For
-//! terminals without Unicode, [`theme`] converts the result.
+//! time, the keys). [`pages`] has the pages; they consist of [`panels`], [`pictures`], [`lists`]
+//! and [`widgets`]. From 80x22 on, the panels are side by side; on smaller terminals there are
+//! plain lines: state, abort, alarm and messages, and the pages that are lines. For terminals
+//! without Unicode, [`theme`] converts the result.
 
 pub mod band;
 pub mod bars;

@@ -53,8 +53,8 @@ pub struct LimitRow {
     pub limit: String,
     /// How much of the limit is used: 0 for a perfect landing, 1 at the limit; NaN without one.
     pub used: f64,
-    /// Whether the vehicle reports the limit as met.
-    pub kept: bool,
+    /// Whether the limit is met, as the vehicle reports it.
+    pub is_met: bool,
     /// The limit of the landing paper's Table 2, in the same unit.
     pub table_2: f64,
 }
@@ -65,17 +65,17 @@ const TABLE_2: [f64; 6] = [20.0, 0.2, 0.4, 0.1, 5.0, 2.0];
 /// A touchdown, the fence, and the design envelope of the legs. Limits and judgement are the
 /// vehicle's.
 pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
-    let told = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
+    let reported = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
         limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
     };
     let degrees = f64::to_degrees;
     let rows = [
-        (at.distance_m, told(|l| l.fence_m), "m"),
+        (at.distance_m, reported(|l| l.fence_m), "m"),
         (at.height_m, f64::NAN, "m"),
-        (-at.vertical_m_s, told(|l| l.vertical_m_s), "m/s"),
-        (at.lateral_m_s, told(|l| l.lateral_m_s), "m/s"),
-        (degrees(at.tilt_rad), degrees(told(|l| l.tilt_rad)), "deg"),
-        (degrees(at.rate_rad_s), degrees(told(|l| l.rate_rad_s)), "deg/s"),
+        (-at.vertical_m_s, reported(|l| l.vertical_m_s), "m/s"),
+        (at.lateral_m_s, reported(|l| l.lateral_m_s), "m/s"),
+        (degrees(at.tilt_rad), degrees(reported(|l| l.tilt_rad)), "deg"),
+        (degrees(at.rate_rad_s), degrees(reported(|l| l.rate_rad_s)), "deg/s"),
     ];
     std::array::from_fn(|place| {
         let ((name, bit), (value, most, unit)) = (LIMITS[place], rows[place]);
@@ -86,8 +86,8 @@ pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> 
             _ => format!("±{} {unit}", shortest(most)),
         };
         let beyond_fence = bit == TdLimit::TD_LIMIT_DISTANCE && most > 0.0 && value > most;
-        let kept = !at.violated.contains(bit) && !beyond_fence;
-        LimitRow { name, value, unit, limit, used: value.abs() / most, kept, table_2: TABLE_2[place] }
+        let is_met = !at.violated.contains(bit) && !beyond_fence;
+        LimitRow { name, value, unit, limit, used: value.abs() / most, is_met, table_2: TABLE_2[place] }
     })
 }
 
@@ -107,7 +107,7 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
     let Some(at) = predict_position(&model.vehicle, now) else {
         return vec![
             theme.line(" position unknown:", TextRole::Alarm),
-            theme.line(" not heard since the pad", TextRole::Caution),
+            theme.line(" no data since the pad", TextRole::Caution),
         ];
     };
     let row = |label: &str, value: f64| {
@@ -126,7 +126,7 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         row("north", at.spot.north_m),
         row("east", at.spot.east_m),
         theme.line(format!(" {source}"), TextRole::Label),
-        theme.line(format!(" last heard {} ago", seconds(at.age)), TextRole::Caution),
+        theme.line(format!(" last data {} ago", seconds(at.age)), TextRole::Caution),
     ]
 }
 
@@ -158,7 +158,7 @@ mod limit_rows_tests {
     }
 
     #[test]
-    fn limits_are_the_vehicles_own_and_unknown_before_it_reports_them() {
+    fn limits_come_from_the_vehicle_and_are_blank_before_its_report() {
         let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
         assert_eq!(words(None), ["", "", "-- m/s", "-- m/s", "-- deg", "-- deg/s"]);
         assert_eq!(words(Some(&LIMITS)), ["±120 m", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);

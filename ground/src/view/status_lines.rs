@@ -1,4 +1,4 @@
-//! The lines around a page: what happens next, the link, the alarm, the bar of the flight.
+//! The lines around a page: the next event, the log, the alarm, the position of a replay.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use unicode_truncate::UnicodeTruncateStr as _;
 use super::{STALE_MARK, TextRole, Theme, fixed, shortest};
 use crate::model::{Alarm, GRAVITY_M_S2, Model, Page, Playback, Role, Vehicle, latch_cause};
 
-/// How long until the next event is shown large, so that the line needs not say it.
+/// Whether the time to the next event is shown large, so that the line can leave it out.
 fn is_large(page: Page, phase: TdPhase) -> bool {
     let timed = matches!(
         phase,
@@ -40,7 +40,7 @@ fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
     within(climb.map(|(climb, age)| climb / GRAVITY_M_S2 - age.as_secs_f64()))
 }
 
-/// The event, in how long, and what else is known about it.
+/// The event, its time, and a remark.
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
@@ -72,7 +72,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
     }
 }
 
-/// Whether the vehicle says that its landing motor will not light.
+/// Whether the vehicle reports its landing motor as inhibited.
 pub fn is_inhibited(vehicle: &Vehicle) -> bool {
     vehicle.interlocks().is_some() && !vehicle.may_light()
 }
@@ -91,8 +91,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
     ("IGNITION".to_owned(), within(left_s), format!("{at}{armed}"))
 }
 
-/// Until the canopy carries the vehicle nothing is known of the time: it falls fast, and will not
-/// for long.
+/// Until the canopy carries the vehicle the time is unknown: it falls fast, and soon slower.
 fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String, String) {
     let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
@@ -205,8 +204,8 @@ pub fn cut(text: &str, columns: usize) -> String {
     let (fits, _) = text.unicode_truncate(room);
     let ends_a_word = text[fits.len()..].starts_with(' ');
     let words = fits.rsplit_once(' ').map(|(words, _)| words).filter(|_| !ends_a_word);
-    let kept = words.filter(|words| 3 * Span::raw(*words).width() >= 2 * room).unwrap_or(fits);
-    format!("{}..", kept.trim_end())
+    let complete_words = words.filter(|words| 3 * Span::raw(*words).width() >= 2 * room).unwrap_or(fits);
+    format!("{}..", complete_words.trim_end())
 }
 
 #[cfg(test)]
@@ -214,8 +213,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_is_cut_behind_a_whole_word() {
-        let text = "LINK LOST: the vehicle is not heard";
+    fn a_text_is_cut_at_a_word_boundary() {
+        let text = "LINK LOST: the vehicle is not there";
         assert_eq!(cut(text, 35), text);
         assert_eq!(cut(text, 34), "LINK LOST: the vehicle is not..");
         assert_eq!(cut(text, 31), "LINK LOST: the vehicle is not..");

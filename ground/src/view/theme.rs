@@ -1,5 +1,5 @@
-//! Gives each role of a text, and each part of a picture, its style. Colour only repeats what a
-//! word or a mark already says.
+//! Gives each role of a text, and each part of a picture, its style. Colour only repeats the
+//! meaning of a word or a mark.
 //!
 //! Dark and light paint their own background, in colours whose values are fixed (the upper 240 of
 //! the 256 of xterm, and what a terminal of 24 bits shows for them), so that their contrast is
@@ -323,7 +323,7 @@ mod theme_tests {
     use super::*;
 
     #[test]
-    fn the_environment_says_what_the_terminal_can_show() {
+    fn the_environment_selects_characters_and_colours() {
         for (set, palette, ascii) in [
             (vec![("TERM", "xterm-256color"), ("LANG", "C.UTF-8")], Palette::Dark, false),
             (vec![("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")], Palette::None, false),

@@ -23,8 +23,8 @@ use crate::model::{
 
 /// Columns of the state: armed, phase, clock, each in its place.
 const STATE_COLUMNS: [u16; 3] = [9, 15, 9];
-/// From this width on the state and what an abort would do, with its key, stand in one row,
-/// otherwise in two.
+/// From this width on the state and the effect of an abort, with its key, share one row, otherwise
+/// two.
 pub const ONE_ROW_COLUMNS: u16 = 160;
 const ABORT_COLUMNS: u16 = 87;
 /// From this width on the rate and the loss of the link are shown beside its ages.
@@ -32,7 +32,7 @@ const RATES_COLUMNS: u16 = 110;
 /// A screen that is less late than this is read as live.
 const LATE_SHOWN: Duration = Duration::from_secs(1);
 
-/// Draws who and what is seen, how well it is heard, and whether that is recorded.
+/// Draws the vehicle and the crew, the state of the link, and whether it is recorded.
 pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let shows_rates = area.width >= RATES_COLUMNS && model.link.trouble.is_none();
     let mut right = Vec::new();
@@ -56,7 +56,7 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     draw_line(frame, right_area, right);
 }
 
-/// How dangerous the vehicle is now, as far as it is known.
+/// The present danger of the vehicle, as far as it is reported.
 pub fn level(model: &Model, now: Duration) -> Level {
     use TdPhase as P;
     let vehicle = &model.vehicle;
@@ -76,8 +76,8 @@ pub fn level(model: &Model, now: Duration) -> Level {
     }
 }
 
-/// Draws the rows in the colour of the danger: state and what comes next, or an alarm that was
-/// seen; what an abort would do, and its key.
+/// Draws the rows in the colour of the danger: the state and the next event, or an acknowledged
+/// alarm; the effect of an abort, and its key.
 pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     frame.buffer_mut().set_style(area, theme.level(level(model, now)));
     let first = Rect { height: area.height.min(1), ..area };
@@ -98,31 +98,31 @@ pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_abort(model, theme, now, frame, if area.height > 1 { below } else { abort_area });
 }
 
-/// For so long the newest event stands in the row of the state on the Pad page.
-const SAID_SHOWN: Duration = Duration::from_secs(10);
+/// How long the newest event is shown in the row of the state on the Pad page.
+const EVENT_SHOWN: Duration = Duration::from_secs(10);
 
-/// An alarm that was seen, what comes next, or what has just been said.
+/// An acknowledged alarm, the next event, or the newest event.
 fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let seen = status_lines::alarm_text(model, theme, now, columns);
     let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
     let next = || status_lines::next_event(model, now, true);
-    // The Pad page says it itself; there it is what has just been said.
+    // The Pad page shows readiness itself; there it is the newest event.
     let is_pad = model.page() == Page::Pad;
     let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
-    let said = || {
-        let fresh = |(event, _): &(&Event, _)| now.saturating_sub(event.at) < SAID_SHOWN;
-        let (event, text) = lists::said(model).next().filter(fresh)?;
+    let event_words = || {
+        let fresh = |(event, _): &(&Event, _)| now.saturating_sub(event.at) < EVENT_SHOWN;
+        let (event, text) = lists::crew_events(model).next().filter(fresh)?;
         Some(format!(" {}{text}", event.mark().trim_start()))
     };
-    // Of an abort that was seen, what comes after it counts.
+    // After an acknowledged abort the next event matters.
     let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.what.kind == AlarmKind::Aborted);
     let after = if aborted { next() } else { None };
-    let words = after.or(seen).or_else(next).or_else(ready).or_else(said)?;
+    let words = after.or(seen).or_else(next).or_else(ready).or_else(event_words)?;
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 
-/// What an abort would do, or how far it is, and its key at the right end. What a begun or unsent
-/// abort says has its keys in it, and the whole row if it needs it.
+/// The effect of an abort, or its progress, and its key at the right end. The text of a begun or
+/// unsent abort contains its keys, and takes the complete row if needed.
 fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let key = format!(" {} ", abort_key(model));
     let [words, key_area] = side_by_side(area, [Fill(1), Length(key.len() as u16)]);
@@ -136,7 +136,7 @@ fn draw_abort(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, are
     draw_line(frame, key_area, Line::from(key));
 }
 
-/// Who is seen, and who commands.
+/// The vehicle, and who commands it.
 pub fn identity(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let (space, vehicle) = (Span::raw(" "), vehicle(model, theme, now));
     Line::from(vec![mode(model, theme), space.clone(), vehicle, space, crew(model, theme, now)])
@@ -160,8 +160,8 @@ fn mode(model: &Model, theme: Theme) -> Span<'static> {
     theme.span(format!(" {word}"), role)
 }
 
-/// Why the vehicle under this id may not be obeyed, or may not be the one that is meant.
-fn doubt(model: &Model, now: Duration) -> Option<String> {
+/// Why the vehicle under this id may not be ours, or may not be the intended one.
+fn identity_warning(model: &Model, now: Duration) -> Option<String> {
     let id = model.settings.vehicle.system_id;
     let misfits = || "ANOTHER VERSION: its messages do not fit".to_owned();
     match model.vehicle.as_foreign() {
@@ -172,25 +172,25 @@ fn doubt(model: &Model, now: Duration) -> Option<String> {
 }
 
 fn vehicle(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
-    if let Some(words) = doubt(model, now) {
+    if let Some(words) = identity_warning(model, now) {
         return theme.span(words, TextRole::Alarm);
     }
     let boot = model.vehicle.boot.number().map_or_else(|| "--".to_owned(), words::boot);
-    let told = model.vehicle.mission().map(|mission| mission.name);
+    let reported = model.vehicle.mission().map(|mission| mission.name);
     let system = model.settings.vehicle.system_id;
     let name =
-        model.settings.vehicle_name.clone().or(told).map_or_else(String::new, |name| format!("{name} "));
+        model.settings.vehicle_name.clone().or(reported).map_or_else(String::new, |name| format!("{name} "));
     let system = if system == VEHICLE.system_id { String::new() } else { format!("system {system} ") };
     theme.plain(format!("{system}{name}boot {boot}"))
 }
 
-/// Who commands: another station that armed the vehicle, otherwise who can command here.
+/// Who commands: another station that armed the vehicle, otherwise those who can command here.
 fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
-    if model.link.station_gone_for(now).is_some() {
+    if model.link.station_lost_for(now).is_some() {
         return theme.span(" NO STATION", TextRole::Alarm);
     }
     if let Some(people) = model.people() {
-        let who = match model.own_number() {
+        let who = match model.operator_number() {
             0 if model.settings.role == Role::Attached && model.key_number() > 0 => {
                 "HOLD/ABORT ONLY".to_owned()
             }
@@ -207,10 +207,9 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         return theme.span(format!(" {text}"), TextRole::Caution);
     }
     let text = match model.settings.role {
-        Role::Replaying => "nobody".to_owned(),
+        Role::Replaying => "no crew".to_owned(),
         Role::Station | Role::Attached if model.vehicle.as_foreign().is_some() => "ABORT only".to_owned(),
-        // First, whoever else sits at this station: the silence of this station holds the
-        // countdown.
+        // First, even with others at this station: the silence of this station holds the countdown.
         _ if model.link.uplink.armed_by_us && model.link.state(now).carries() => "armed here".to_owned(),
         _ if model.link.uplink.armed_by_us => "~armed here".to_owned(),
         _ if model.crew.seats().iter().any(|seat| *seat != model.settings.seat) => {
@@ -234,7 +233,7 @@ pub const ABORT_LABEL: &str = " abort now: ";
 /// The key that aborts from this screen, or why none does.
 pub fn abort_key(model: &Model) -> String {
     match model.settings.role {
-        Role::Attached if model.link.station_gone => "NO STATION".to_owned(),
+        Role::Attached if model.link.station_lost => "NO STATION".to_owned(),
         Role::Station | Role::Attached => format!("ABORT {ABORT_KEY}"),
         Role::Watching => "WATCHING only".to_owned(),
         Role::Replaying => "REPLAY".to_owned(),
@@ -284,14 +283,14 @@ pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// The time to release as it is now, s: it runs on between two reports, for as long as a report is
-/// not stale, and stands still at the release and on the ground.
-fn clock_s(model: &Model, told: Sample<f64>, now: Duration) -> f64 {
-    let left_s = told.value - told.age(now).min(STALE_AFTER).as_secs_f64();
-    match told.value > 0.0 {
+/// The present time to release, s: it runs on between two reports while a report is fresh, and
+/// stops at the release and on the ground.
+fn clock_s(model: &Model, reported: Sample<f64>, now: Duration) -> f64 {
+    let left_s = reported.value - reported.age(now).min(STALE_AFTER).as_secs_f64();
+    match reported.value > 0.0 {
         true => left_s.max(0.0),
         false if model.vehicle.in_flight() => left_s,
-        false => told.value,
+        false => reported.value,
     }
 }
 
@@ -312,26 +311,26 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
     }
 }
 
-/// Both directions of the link, each with the age of its last frame: hearing the vehicle does not
-/// prove that it hears us. Whole seconds, because heartbeats come only once a second. On an
-/// attached screen, that its station is silent.
+/// Both directions of the link, each with the age of its last frame: a downlink does not prove the
+/// uplink. Full seconds, because heartbeats come only once a second. On an attached screen, the
+/// silence of its station.
 pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
-    if let Some(gone) = model.link.station_gone_for(now) {
+    if let Some(gone) = model.link.station_lost_for(now) {
         return theme.line(format!("STATION GONE {}s", gone.as_secs()), TextRole::Alarm);
     }
     if let Some(silence) = model.link.station_silence(now) {
         let words = format!("STATION SILENT {}s", silence.as_secs());
         return theme.line(words, TextRole::Alarm);
     }
-    // Another autopilot dates few of its messages: the age of the last one that it dates says
-    // nothing about the link.
+    // Another autopilot dates few of its messages: the age of the last dated one is no measure of
+    // the link.
     let foreign = model.vehicle.as_foreign().is_some();
     let down = if foreign { model.link.state(now) } else { model.link.down(now) };
-    if down == LinkState::NeverHeard {
-        return theme.line("down: not heard", TextRole::Caution);
+    if down == LinkState::NeverReceived {
+        return theme.line("down: no data", TextRole::Caution);
     }
     let direction = |name: &str, loud: &str, state| match state {
-        LinkState::NeverHeard => theme.span(format!("{loud} NOT PROVEN"), TextRole::Alarm),
+        LinkState::NeverReceived => theme.span(format!("{loud} NOT PROVEN"), TextRole::Alarm),
         LinkState::Alive(age) => theme.span(format!("{name} {}s", age.as_secs()), TextRole::Good),
         LinkState::Doubtful(age) => theme.span(format!("{name} late {}s", age.as_secs()), TextRole::Caution),
         LinkState::Lost(age) => theme.span(format!("{loud} LOST {}s", age.as_secs()), TextRole::Alarm),
@@ -346,13 +345,13 @@ pub fn link(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     Line::from(vec![direction("down", "DOWN", down), Span::raw(" "), up, Span::raw(" ")])
 }
 
-/// What an abort would do now, or the progress of the commanded abort, in as many columns.
+/// The present effect of an abort, or the progress of the commanded abort, in as many columns.
 pub fn abort(model: &Model, theme: Theme, now: Duration, columns: usize) -> Line<'static> {
     if let Some(why) = model.link.why_abort_not_sent(now) {
         return theme.line(format!(" ABORT NOT SENT: {why}"), TextRole::Alarm);
     }
-    if model.link.abort_asked_at.is_some() {
-        return theme.line(" ABORT asked, not yet taken by the station", TextRole::Alarm);
+    if model.link.abort_requested_at.is_some() {
+        return theme.line(" ABORT requested, not yet accepted by the station", TextRole::Alarm);
     }
     let effect = abort_effect(model, now);
     if model.abort_chord.is_begun(now) {
@@ -378,17 +377,17 @@ fn hold_until(model: &Model, now: Duration) -> Option<String> {
     Some(format!("; hold until T-{}", shortest((10.0 * last_s).ceil() / 10.0)))
 }
 
-/// What an abort would do now, marked if the report is stale.
+/// The present effect of an abort, marked if the report is stale.
 fn abort_effect(model: &Model, now: Duration) -> String {
     let status = match model.vehicle.status.as_ref() {
-        _ if model.link.station_gone => return "NOT SENT: no station; kept for the next one".to_owned(),
+        _ if model.link.station_lost => return "NOT SENT: no station; the next one sends it".to_owned(),
         _ if model.link.station_silence(now).is_some() => {
-            return "NOT SENT while the station hangs; kept".to_owned();
+            return "NOT SENT while the station hangs".to_owned();
         }
         _ if model.vehicle.as_foreign().is_some() => return TERMINATION.to_owned(),
         None => return "unknown".to_owned(),
         _ if may_have_left(&model.vehicle, now).is_some() => {
-            return "MAY NOT ARRIVE; what it would do is not told".to_owned();
+            return "MAY NOT ARRIVE; its effect is not reported".to_owned();
         }
         _ if model.settings.role != Role::Replaying
             && let Some(why) = abort_too_late(model, now) =>
@@ -409,7 +408,7 @@ fn abort_effect(model: &Model, now: Duration) -> String {
 pub fn hands_off(model: &Model, theme: Theme, now: Duration) -> Option<Line<'static>> {
     let words = match standing(model, now) {
         Standing::Runs => {
-            let done = model.vehicle.pad_check.as_ref().map_or(0, |check| check.told.progress);
+            let done = model.vehicle.pad_check.as_ref().map_or(0, |check| check.report.progress);
             format!(" HANDS OFF: a check of the vehicle runs, {done} %")
         }
         Standing::MayRun => " HANDS OFF: a check of the vehicle may run".to_owned(),
@@ -437,7 +436,7 @@ fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) 
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
-        Acknowledgement::Asked => ("asked, not confirmed".to_owned(), TextRole::Caution),
+        Acknowledgement::AwaitsConfirmation => ("requested, not confirmed".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),
@@ -468,15 +467,15 @@ fn refusal(result: u8) -> &'static str {
     }
 }
 
-/// What the row above the keys says instead of the flight: that a check moves the surfaces, a
-/// command, or a hold.
+/// The message above the keys, in place of the flight: a check that moves the surfaces, a command,
+/// or a hold.
 pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let latest = model.commands.tracks.iter().rfind(|track| track.kind != CommandKind::Abort);
     let is_past = |at: Duration| now.saturating_sub(at) >= OPEN_SHOWN;
     let is_open = |track: &&TrackedCommand| {
         track.observed_at.is_none() && !track.is_withdrawn && !is_past(track.commanded_at)
     };
-    let is_news = |track: &&TrackedCommand| {
+    let is_recent = |track: &&TrackedCommand| {
         let answered = matches!(track.acknowledged, Acknowledgement::Answered(_) | Acknowledgement::GivenUp);
         !answered || !is_past(track.acknowledged_at.unwrap_or(track.commanded_at))
     };
@@ -485,7 +484,7 @@ pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Op
     hands_off(model, theme, now)
         .or_else(|| latest.filter(is_open).map(facts))
         .or_else(|| hold().map(|words| theme.line(words, TextRole::Alarm)))
-        .or_else(|| latest.filter(is_news).map(facts))
+        .or_else(|| latest.filter(is_recent).map(facts))
 }
 
 /// Whether the vehicle may be armed: GO only if every check passes and the uplink is proven. `None`

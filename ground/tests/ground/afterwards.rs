@@ -13,7 +13,7 @@ fn station(role: Role) -> Rig {
     let mut rig = Rig::new(Settings { role, start_unix_s: 1_800_000_000, ..settings(false, true) });
     rig.run(1.0);
     let (latitude, longitude) = (353_470_000, -1_178_090_000);
-    rig.hear(&MavMessage::HOME_POSITION(HOME_POSITION_DATA {
+    rig.receive(&MavMessage::HOME_POSITION(HOME_POSITION_DATA {
         latitude,
         longitude,
         ..HOME_POSITION_DATA::default()
@@ -33,16 +33,16 @@ fn falling(role: Role) -> Rig {
     rig
 }
 
-fn asks(rig: &mut Rig, key: char) -> Vec<Action> {
+fn requests(rig: &mut Rig, key: char) -> Vec<Action> {
     rig.actions.clear();
     rig.key(Key::Char(key));
     let asked = |action: &Action| matches!(action, Action::WriteReport | Action::Request(Request::Report));
     rig.actions.iter().filter(|action| asked(action)).cloned().collect()
 }
 
-/// What was not heard may have been greater.
+/// Unreceived values may have been greater.
 #[test]
-fn the_review_says_how_much_of_the_flight_was_not_heard() {
+fn the_review_shows_the_longest_silence_of_the_flight() {
     let mut rig = falling(Role::Station);
     rig.key(Key::Char('4'));
     let said = |rig: &Rig| {
@@ -54,7 +54,7 @@ fn the_review_says_how_much_of_the_flight_was_not_heard() {
     rig.speaks = false;
     rig.run(5.0);
     assert_eq!(said(&rig), "no verdict received yet; link LOST before touchdown");
-    assert!(rig.screen(140, 45).contains("not told yet"), "{}", rig.screen(140, 45));
+    assert!(rig.screen(140, 45).contains("not reported yet"), "{}", rig.screen(140, 45));
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_SAFED;
     rig.run(2.0);
@@ -68,58 +68,58 @@ fn the_review_says_how_much_of_the_flight_was_not_heard() {
 #[test]
 fn the_report_waits_for_the_end_of_a_flight() {
     let mut rig = station(Role::Station);
-    assert_eq!(asks(&mut rig, 'W'), []);
+    assert_eq!(requests(&mut rig, 'W'), []);
     rig.expect_event("no report: no flight has been flown yet");
     let mut rig = falling(Role::Station);
-    assert_eq!(asks(&mut rig, 'W'), []);
+    assert_eq!(requests(&mut rig, 'W'), []);
     rig.expect_event("no report: the vehicle is armed or in flight");
     rig.phase = TdPhase::TD_PHASE_SAFED;
     rig.run(1.0);
-    assert_eq!(asks(&mut rig, 'W'), [Action::Request(Request::Report), Action::WriteReport]);
+    assert_eq!(requests(&mut rig, 'W'), [Action::Request(Request::Report), Action::WriteReport]);
     rig.msg(Msg::Report(Ok("flight.html".to_owned())));
     rig.expect_event("the report is written: flight.html");
     rig.armed = true;
     rig.heartbeat();
-    assert_eq!(asks(&mut rig, 'W'), []);
+    assert_eq!(requests(&mut rig, 'W'), []);
 }
 
 #[test]
-fn an_attached_screen_asks_the_station_for_the_report() {
+fn an_attached_screen_requests_the_report_from_the_station() {
     for (role, report) in
         [(Role::Attached, vec![Action::Request(Request::Report)]), (Role::Watching, Vec::new())]
     {
         let mut rig = falling(role);
         rig.phase = TdPhase::TD_PHASE_SAFED;
         rig.run(1.0);
-        assert_eq!(asks(&mut rig, 'W'), report);
+        assert_eq!(requests(&mut rig, 'W'), report);
     }
 }
 
-fn kept(rig: &Rig) -> Vec<LastPlace> {
+fn stored(rig: &Rig) -> Vec<LastPlace> {
     let place = |action: &Action| match action {
-        Action::KeepPlace(place) => Some(**place),
+        Action::StorePlace(place) => Some(**place),
         _ => None,
     };
     rig.actions.iter().filter_map(place).collect()
 }
 
 #[test]
-fn the_last_place_is_kept_in_flight_and_predicted_after_the_loss() {
+fn the_last_position_is_stored_in_flight_and_predicted_after_the_loss() {
     let mut rig = station(Role::Station);
     rig.state(0.0, 0.0, 0.0, 0.0, 90.0);
     rig.run(5.0);
-    assert_eq!(kept(&rig), [], "on the pad there is nothing to look for");
+    assert_eq!(stored(&rig), [], "on the pad there is nothing to look for");
     let mut rig = falling(Role::Station);
-    let places = kept(&rig);
+    let places = stored(&rig);
     assert!((1..=2).contains(&places.len()), "every 2 s: {places:?}");
-    assert!(places[0].predicted.is_none() && (places[0].heard.north_m - 30.0).abs() < 0.1);
+    assert!(places[0].predicted.is_none() && (places[0].received.north_m - 30.0).abs() < 0.1);
     rig.speaks = false;
     rig.actions.clear();
     rig.run(20.0);
-    let places = kept(&rig);
+    let places = stored(&rig);
     let last = places.last().unwrap();
     let predicted = last.predicted.unwrap();
-    assert!(predicted.error_m > last.heard.error_m && last.heard_unix_s <= 1_800_000_004, "{last:?}");
+    assert!(predicted.error_m > last.received.error_m && last.received_unix_s <= 1_800_000_004, "{last:?}");
     assert!((places.len()) <= 11, "{}", places.len());
     rig.key(Key::Char('f'));
     for (columns, rows) in [(80, 24), (140, 45), (200, 60)] {
@@ -132,7 +132,7 @@ fn the_last_place_is_kept_in_flight_and_predicted_after_the_loss() {
 
 #[test]
 fn a_place_from_before_a_restart_is_shown_with_the_way_from_the_station() {
-    let place = *kept(&falling(Role::Station)).last().unwrap();
+    let place = *stored(&falling(Role::Station)).last().unwrap();
     // 40 m south of the pad.
     let here = Some(PAD.moved(-40.0, 5.0));
     let mut rig = Rig::new(Settings { here, start_unix_s: 1_800_000_100, ..settings(false, true) });
@@ -146,17 +146,21 @@ fn a_place_from_before_a_restart_is_shown_with_the_way_from_the_station() {
 
 /// A station that was switched on after the touchdown: the vehicle's own place is enough.
 #[test]
-fn the_place_of_a_vehicle_that_has_not_told_its_pad_is_known() {
+fn the_position_of_a_vehicle_without_a_reported_pad_is_shown() {
     let mut rig = Rig::new(settings(false, true));
     rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
     rig.run(1.0);
     rig.state_in_space([30.0, 5.0, 2.0], [0.0; 3], (200.0, 4.0));
     let there = PAD.moved(30.0, 5.0);
     let [lat, lon] = [there.latitude, there.longitude].map(|degrees| (degrees * 1e7).round() as i32);
-    rig.hear(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA { lat, lon, ..Default::default() }));
+    rig.receive(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        lat,
+        lon,
+        ..Default::default()
+    }));
     rig.run(1.0);
     let place = rig.model.last_place(rig.now).unwrap();
-    let (north_m, east_m) = there.to(place.degrees(&place.heard).unwrap());
+    let (north_m, east_m) = there.to(place.degrees(&place.received).unwrap());
     assert!(north_m.abs() < 0.1 && east_m.abs() < 0.1, "{place:?}");
     assert!(place.pad.is_some_and(|pad| (pad.latitude - PAD.latitude).abs() < 1e-6), "{place:?}");
     // Where it lies, for a phone's camera, beside DO NOT APPROACH on the smallest screen, too.
@@ -190,8 +194,8 @@ fn dots(rig: &Rig, (columns, rows): (u16, u16)) -> Vec<(f64, f64)> {
 #[test]
 fn the_arrow_points_to_the_vehicle() {
     for (north_m, east_m) in [(50.0, 0.0), (-50.0, 0.0), (0.0, 50.0), (0.0, -50.0)] {
-        let mut place = *kept(&falling(Role::Station)).last().unwrap();
-        (place.heard.north_m, place.heard.east_m, place.predicted) = (north_m, east_m, None);
+        let mut place = *stored(&falling(Role::Station)).last().unwrap();
+        (place.received.north_m, place.received.east_m, place.predicted) = (north_m, east_m, None);
         let mut rig = Rig::new(settings(false, true));
         rig.msg(Msg::Place(Box::new(place)));
         rig.run(1.0);

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{AlarmKind, RING_EVERY, Role, Settings, refused_frames, unheard_hints};
+use ground::model::{AlarmKind, RING_EVERY, Role, Settings, link_hints, refused_frames};
 use ground::update::vehicle_changes::RESTARTED;
 use ground::update::{Action, Msg};
 use ground::view::headline::pad;
@@ -39,7 +39,7 @@ fn the_loss_of_the_link_rings_until_it_is_acknowledged() {
     rig.speaks = true;
     rig.run(1.1);
     assert!(rig.model.alarms.list().is_empty());
-    // It comes back: nobody has seen that one.
+    // It returns as a new, unacknowledged alarm.
     rig.speaks = false;
     rig.run(5.0);
     assert_eq!(rig.model.alarms.unacknowledged(), 1);
@@ -72,15 +72,15 @@ fn a_log_of_the_vehicle_that_stops_in_flight_is_an_alarm_that_stays() {
             ..SYS_STATUS_DATA::default()
         })
     };
-    rig.hear(&status(log));
+    rig.receive(&status(log));
     rig.run(1.0);
-    let is_told = |rig: &Rig| rig.model.alarms.is_unseen(AlarmKind::VehicleLog);
-    assert!(!is_told(&rig));
-    rig.hear(&status(MavSysStatusSensor::empty()));
+    let is_reported = |rig: &Rig| rig.model.alarms.is_unseen(AlarmKind::VehicleLog);
+    assert!(!is_reported(&rig));
+    rig.receive(&status(MavSysStatusSensor::empty()));
     rig.run(30.0);
-    assert!(is_told(&rig) && rig.model.vehicle.log_has_stopped());
+    assert!(is_reported(&rig) && rig.model.vehicle.log_has_stopped());
     let text = rig.model.alarms.foremost().map(|alarm| alarm.what.text.as_str());
-    assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded whole"));
+    assert_eq!(text, Some("VEHICLE LOG has stopped: this flight is not recorded completely"));
 }
 
 /// On the pad it is a failing check, and on the way up no receiver holds its fix.
@@ -89,12 +89,12 @@ fn a_loss_of_gnss_from_apogee_on_is_an_alarm_on_every_page() {
     let gnss = MavSysStatusSensor::MAV_SYS_STATUS_SENSOR_GPS;
     let absolute = EstimatorStatusFlags::ESTIMATOR_POS_HORIZ_ABS;
     let loss = |rig: &mut Rig, health, flags| {
-        rig.hear(&MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+        rig.receive(&MavMessage::SYS_STATUS(SYS_STATUS_DATA {
             onboard_control_sensors_present: gnss,
             onboard_control_sensors_health: health,
             ..SYS_STATUS_DATA::default()
         }));
-        rig.hear(&MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
+        rig.receive(&MavMessage::ESTIMATOR_STATUS(ESTIMATOR_STATUS_DATA {
             flags,
             pos_horiz_accuracy: 40.0,
             ..ESTIMATOR_STATUS_DATA::default()
@@ -175,10 +175,10 @@ fn attaching_does_not_ring_for_past_alarms() {
     over.run(30.0);
     assert_eq!(bells(&over), 0);
     let screen = over.screen(80, 24);
-    assert!(screen.contains(" past alarm: LINK LOST: the vehicle is not heard ended 89 s ago"), "{screen}");
+    assert!(screen.contains(" past alarm: LINK LOST: no telemetry ended 89 s ago"), "{screen}");
     over.speaks = false;
     over.run(5.0);
-    assert_eq!(bells(&over), 1, "lost anew");
+    assert_eq!(bells(&over), 1, "lost again");
     over.expect_screen("ALARM LINK LOST");
     let mut lasting = attached(0.0);
     lasting.speaks = false;
@@ -186,9 +186,9 @@ fn attaching_does_not_ring_for_past_alarms() {
     assert_eq!(bells(&lasting), 1, "it still holds");
 }
 
-/// A station that hangs tells its screens nothing; that says nothing about the vehicle.
+/// A station that hangs sends its screens nothing; that is no evidence about the vehicle.
 #[test]
-fn a_screen_says_that_its_station_is_silent() {
+fn a_screen_reports_a_silent_station() {
     for role in [Role::Attached, Role::Watching] {
         let mut rig = Rig::new(Settings { role, ..settings(false, true) });
         rig.run(5.0);
@@ -209,7 +209,7 @@ fn a_screen_says_that_its_station_is_silent() {
         let screen = rig.screen(80, 24);
         assert!(screen.contains("ALARM STATION SILENT"), "{screen}");
         assert!(screen.contains("STATION SILENT 10s") && !screen.contains("LOST"), "{screen}");
-        // It cannot be asked of the silent station.
+        // The silent station cannot acknowledge it.
         rig.actions.clear();
         rig.key(Key::Char(' '));
         assert!(rig.actions.iter().all(|action| !matches!(action, Action::Request(_))));
@@ -226,7 +226,7 @@ fn a_screen_says_that_its_station_is_silent() {
 
 /// Until the first plan is used the stabiliser flies by design; after that it is an alarm.
 #[test]
-fn the_stabiliser_raises_an_alarm_only_if_it_keeps_flying() {
+fn the_stabiliser_raises_an_alarm_only_if_it_continues_to_fly() {
     let stabiliser = TdControlLevel::TD_CONTROL_LEVEL_STABILISER;
     let mut rig = Rig::crewed();
     rig.phase = TdPhase::TD_PHASE_POWERED;
@@ -259,7 +259,7 @@ fn an_abort_without_an_answer_is_an_alarm_while_it_is_repeated() {
 }
 
 #[test]
-fn an_abort_that_would_arrive_too_late_says_so() {
+fn an_abort_that_would_arrive_too_late_is_marked() {
     let mut rig = Rig::crewed();
     rig.phase = TdPhase::TD_PHASE_AERO_DESCENT;
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
@@ -329,28 +329,28 @@ fn a_long_alarm_text_never_hides_the_key_that_acknowledges() {
 /// A station on a wrong port says what it listens on and what to check, on the page and once as an
 /// event.
 #[test]
-fn a_vehicle_that_was_never_heard_has_hints_on_the_main_page() {
+fn a_link_without_data_has_hints_on_the_main_page() {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     rig.run(4.0);
-    assert_eq!(unheard_hints(&rig.model, rig.now), None);
+    assert_eq!(link_hints(&rig.model, rig.now), None);
     rig.run(3.0);
     for size in [(80, 24), (80, 22), (120, 40), (40, 12)] {
         let screen = rig.screen(size.0, size.1);
-        assert!(screen.contains("Nothing heard from system 1"), "{screen}");
+        assert!(screen.contains("Nothing received from system 1"), "{screen}");
         assert!(size.0 < 80 || screen.contains("fitted?"), "{screen}");
     }
     let screen = rig.screen(80, 24);
     assert!(screen.contains("It listens on 127.0.0.1:14550"), "{screen}");
-    assert_eq!(rig.events().matches("Nothing heard").count(), 1);
+    assert_eq!(rig.events().matches("Nothing received").count(), 1);
     rig.speaks = true;
     rig.run(2.0);
-    assert_eq!(unheard_hints(&rig.model, rig.now), None);
+    assert_eq!(link_hints(&rig.model, rig.now), None);
 }
 
 /// A wrong key: an alarm with the number of frames, and the hint on the page.
 #[test]
-fn frames_that_are_refused_for_their_signature_raise_an_alarm_while_nothing_else_is_heard() {
+fn frames_refused_for_their_signature_raise_an_alarm_on_a_silent_link() {
     let counters = |wrong| Some(SigningCounters { wrong, ..SigningCounters::default() });
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
@@ -363,7 +363,7 @@ fn frames_that_are_refused_for_their_signature_raise_an_alarm_while_nothing_else
     let alarm = rig.model.alarms.foremost().map(|alarm| (alarm.what.kind, alarm.what.text.as_str()));
     assert_eq!(alarm, Some((AlarmKind::Signatures, words)));
     assert!(rig.actions.contains(&Action::Bell));
-    // Unknown senders beside a vehicle that is heard ring no bell.
+    // Unknown senders beside a received vehicle ring no bell.
     let mut rig = Rig::crewed();
     rig.msg(Msg::Links { links: Vec::new(), signing: counters(500) });
     rig.run(1.0);

@@ -115,17 +115,17 @@ fn a_temporary_refusal_is_commanded_again_once_the_checks_pass() {
 #[test]
 fn repeated_temporary_refusals_end_with_the_time_limit() {
     let mut rig = Rig::new(settings(true, false));
-    let mut asked = 0;
+    let mut requests = 0;
     let mut quit = false;
     for _ in 0..200 {
         rig.run(0.1);
         quit |= rig.wants_to_quit();
         for _ in rig.take_commands().into_iter().filter(is_arm) {
-            asked += 1;
+            requests += 1;
             rig.answer(ARM, TEMPORARILY_REJECTED);
         }
     }
-    assert!((5..=12).contains(&asked), "asked {asked} times");
+    assert!((5..=12).contains(&requests), "{requests} requests");
     let why = rig.model.outcome.refusal.as_ref().map(|(why, _)| why.as_str());
     assert_eq!(why, Some("ARM not sent: temporarily refused, although no check fails"));
     assert!(quit);

@@ -1,4 +1,4 @@
-//! What is entered into the station's book, and how the vehicle is told its end.
+//! The entries of the station's book, and how its end is sent to the vehicle.
 
 use ground::key::Key;
 use ground::model::BookLine;
@@ -46,18 +46,18 @@ fn keys_commands_answers_and_what_the_vehicle_shows_are_entered_once() {
 }
 
 #[test]
-fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
+fn requests_confirmations_and_commands_are_entered_with_name_and_key() {
     let mut rig = Rig::crewed();
     let mut name = [0; 16];
     name[..3].copy_from_slice(b"Bob");
-    rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+    rig.receive(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
         boot_number: 0,
         number: 2,
         role: TdRole::TD_ROLE_FLIGHT,
         name: name.into(),
     }));
     let crew = TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() };
-    rig.hear(&MavMessage::TD_CREW(crew.clone()));
+    rig.receive(&MavMessage::TD_CREW(crew.clone()));
     let ask = TD_CREW_DATA {
         act: TdAct::TD_ACT_ARM,
         ask_number: 4_711,
@@ -65,10 +65,10 @@ fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
         ask_left_ms: 9_000,
         ..crew.clone()
     };
-    rig.hear(&MavMessage::TD_CREW(ask.clone()));
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { ask_left_ms: 8_000, ..ask }));
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, ..crew.clone() }));
-    assert_eq!(has(&rig, "vehicle says", "key 2: asks to arm (ask 4711)"), 1);
+    rig.receive(&MavMessage::TD_CREW(ask.clone()));
+    rig.receive(&MavMessage::TD_CREW(TD_CREW_DATA { ask_left_ms: 8_000, ..ask }));
+    rig.receive(&MavMessage::TD_CREW(TD_CREW_DATA { commanded_by: 2, ..crew.clone() }));
+    assert_eq!(has(&rig, "vehicle says", "key 2: requests to arm (request 4711)"), 1);
     let by = entered(&rig).into_iter().find(|line| line.text.contains("is in command")).unwrap();
     assert_eq!(by.who, "FLIGHT Bob");
     // Whichever message is first. Only the one who requested a hold is entered as a person.
@@ -80,16 +80,16 @@ fn who_asks_confirms_and_commands_is_entered_with_name_and_key() {
     ] {
         for crew_first in [true, false] {
             (rig.hold, rig.phase) = (TdHold::TD_HOLD_NONE, TdPhase::TD_PHASE_PAD_ARMED);
-            rig.hear(&MavMessage::TD_CREW(crew.clone()));
+            rig.receive(&MavMessage::TD_CREW(crew.clone()));
             rig.run(0.2);
             rig.actions.clear();
             let held = MavMessage::TD_CREW(TD_CREW_DATA { held_by: 2, ..crew.clone() });
             if crew_first {
-                rig.hear(&held);
+                rig.receive(&held);
             }
             rig.hold = hold;
             rig.run(0.2);
-            rig.hear(&held);
+            rig.receive(&held);
             rig.run(0.2);
             let entries = entered(&rig);
             let entry = entries.iter().find(|line| line.kind == "vehicle says" && line.text == words);
@@ -114,7 +114,7 @@ fn heads(rig: &mut Rig) -> Vec<TD_BOOK_HEAD_DATA> {
 }
 
 #[test]
-fn the_vehicle_is_told_the_end_until_it_confirms_it() {
+fn the_end_of_the_book_is_sent_until_the_vehicle_confirms_it() {
     let mut rig = Rig::crewed();
     let mut book = Book::default();
     book.enter(&Line { unix_ns: 1, kind: "opened", who: "", text: "" });
@@ -138,11 +138,11 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
         TD_BOOK_KEPT_DATA { target_system: 7, ..kept.clone() },
         TD_BOOK_KEPT_DATA { entries: 9, ..kept.clone() },
     ] {
-        rig.hear(&MavMessage::TD_BOOK_KEPT(wrong));
+        rig.receive(&MavMessage::TD_BOOK_KEPT(wrong));
     }
     rig.run(3.0);
     assert!(!heads(&mut rig).is_empty());
-    rig.hear(&MavMessage::TD_BOOK_KEPT(kept));
+    rig.receive(&MavMessage::TD_BOOK_KEPT(kept));
     rig.run(5.0);
     assert!(heads(&mut rig).is_empty());
     rig.key(Key::Char('7'));
@@ -155,7 +155,7 @@ fn the_vehicle_is_told_the_end_until_it_confirms_it() {
 }
 
 #[test]
-fn what_the_vehicle_says_has_its_boot_while_another_one_is_heard() {
+fn entries_of_the_vehicle_name_its_boot_while_another_one_is_received() {
     let mut rig = Rig::crewed();
     rig.text("alone");
     crate::who::beside(&mut rig, 9, 2);
@@ -186,7 +186,7 @@ fn a_note_goes_into_log_and_book_with_who_wrote_it() {
 }
 
 #[test]
-fn a_hold_that_the_vehicle_chose_is_said_with_its_reason() {
+fn a_hold_by_the_vehicle_is_reported_with_its_reason() {
     let mut rig = Rig::crewed();
     (rig.phase, rig.armed) = (TdPhase::TD_PHASE_PAD_ARMED, true);
     (rig.hold, rig.countdown_ms) = (TdHold::TD_HOLD_CHECK_FAILED, i32::MAX);

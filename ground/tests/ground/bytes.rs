@@ -53,7 +53,7 @@ fn shown_by(emulator: &vt100::Parser) -> Vec<String> {
 }
 
 /// A terminal behind a line that takes so many bytes a second at a moment, and answers what it is
-/// asked.
+/// queried.
 struct SlowTerminal {
     bytes_per_s: fn(Duration) -> f64,
     /// Bytes that it has not taken yet, at this moment, and those of them before a question.
@@ -160,7 +160,7 @@ fn flight_over(
             assert!(now < fresh_at + Duration::from_secs(2), "{now:?}: old pictures");
             pace.drew(&model, u32::from(columns) * u32::from(rows), bytes, now);
             if let Some(slow) = &mut slow {
-                let late = slow.take(bytes, pace.asks(now), now).saturating_sub(now);
+                let late = slow.take(bytes, pace.begins_query(now), now).saturating_sub(now);
                 // A whole page of this size takes 3.5 s on this line; nothing waits behind more
                 // than half a second of another.
                 assert!(late < Duration::from_secs(4), "{now:?}: {late:?}");
@@ -213,20 +213,20 @@ fn no_second_of_a_landing_writes_more_than_a_slow_line_carries() {
         let span_s = flown[flown.len() - 1].0.as_secs_f64() - flown[0].0.as_secs_f64();
         let mean = flown.iter().map(|(_, bytes, _)| bytes).sum::<usize>() as f64 / span_s;
         let largest = frames[1..].iter().map(|(_, bytes, _)| *bytes).max().unwrap_or(0);
-        let told = format!(
+        let report = format!(
             "{columns}x{rows}: worst second {bytes} B, up to {:.2} s, {phase:?}; in flight {mean:.0} B/s in {} frames over \
              {span_s:.1} s; largest frame {largest} B",
             at.as_secs_f64(),
             flown.len()
         );
-        println!("{told}");
-        assert!(bytes < most, "{told}");
-        assert!(flown.len() as f64 / span_s > 1.0, "it must still move: {told}");
+        println!("{report}");
+        assert!(bytes < most, "{report}");
+        assert!(flown.len() as f64 / span_s > 1.0, "it must still move: {report}");
     }
 }
 
 #[test]
-fn a_slow_terminal_is_not_far_behind_and_says_so() {
+fn a_slow_terminal_is_not_far_behind_and_shows_its_delay() {
     let frames = flight_over("mk2", 140, 45, Some(|_| 2_000.0));
     assert!(frames.len() > 20, "it must still move: {} frames", frames.len());
 }

@@ -55,13 +55,13 @@ fn list(rig: &Rig) -> &Checklist {
     rig.model.checklist.as_ref().expect("the station has a checklist")
 }
 
-fn asked(rig: &mut Rig, step: u8, void: bool, who: &str) {
-    rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, who) });
+fn requested(rig: &mut Rig, step: u8, void: bool, who: &str) {
+    rig.msg(Msg::Requested { request: Request::Sign { step, void }, by: Seat::new(2, who) });
 }
 
 fn sign_all(rig: &mut Rig) {
     for (step, who) in [(0, "Ann"), (1, "Bob"), (2, "Ann")] {
-        asked(rig, step, false, who);
+        requested(rig, step, false, who);
     }
 }
 
@@ -97,7 +97,7 @@ fn a_step_is_signed_on_the_pad_page_with_a_key_and_enter() {
     let kept = rig
         .actions
         .iter()
-        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Marked { step: 0, .. })));
+        .filter(|action| matches!(action, Action::StoreChecklist(ChecklistEntry::Marked { step: 0, .. })));
     assert_eq!(kept.count(), 1);
     let booked = rig.actions.iter().any(|action| match action {
         Action::Enter(line) => {
@@ -129,14 +129,14 @@ fn a_step_of_another_role_is_refused_on_the_page_with_the_reason() {
     }
     // A dialog that was open before the vehicle was armed elsewhere, and a screen that does not
     // know the roles.
-    asked(&mut rig, 1, false, "Ann");
-    let told = rig.actions.iter().rev().find_map(|action| match action {
+    requested(&mut rig, 1, false, "Ann");
+    let reason = rig.actions.iter().rev().find_map(|action| match action {
         Action::RefuseSignature(why) => Some(why.clone()),
         _ => None,
     });
     let mut attached = station(LIST, Role::Attached);
     attached.keys(&[Key::Char('k'), Key::Down, Key::Char('G'), Key::Enter]);
-    attached.msg(Msg::SignRefused(told.expect("the screens are told")));
+    attached.msg(Msg::SignRefused(reason.expect("the screens receive the reason")));
     attached.expect_screen(why);
     attached.expect_event(why);
     attached.run(20.0);
@@ -162,9 +162,9 @@ fn the_example_crew_can_finish_both_example_checklists() {
         for (place, step) in list_of(list).steps.iter().enumerate() {
             let signer = crew.members.iter().find(|member| step.role.is_none_or(|role| role == member.role));
             let signer =
-                signer.unwrap_or_else(|| panic!("nobody of the example crew signs `{}`", step.words));
+                signer.unwrap_or_else(|| panic!("no member of the example crew signs `{}`", step.words));
             upright(&mut rig, 90.0);
-            asked(&mut rig, u8::try_from(place).unwrap(), false, &signer.name);
+            requested(&mut rig, u8::try_from(place).unwrap(), false, &signer.name);
         }
         let (done, all) = rig.model.steps_done(rig.now).expect("a checklist");
         assert_eq!(done, all, "{}", rig.events());
@@ -179,31 +179,31 @@ fn list_of(text: &str) -> Checklist {
 fn who_may_not_sign_is_refused_with_the_reason() {
     let mut rig = station(LIST, Role::Station);
     for (who, why) in [("Bob", "RANGE SAFETY signs it, Bob is FLIGHT"), ("Oli", "Oli is an observer")] {
-        asked(&mut rig, 0, false, who);
+        requested(&mut rig, 0, false, who);
         rig.expect_event(why);
     }
-    asked(&mut rig, 0, false, "Eve");
-    asked(&mut rig, 0, false, "");
-    asked(&mut rig, 99, false, "Ann");
-    for why in ["Eve is not in the crew", "nobody is named", "there is no such step"] {
+    requested(&mut rig, 0, false, "Eve");
+    requested(&mut rig, 0, false, "");
+    requested(&mut rig, 99, false, "Ann");
+    for why in ["Eve is not in the crew", "no operator is named", "there is no such step"] {
         assert!(rig.events().contains(why), "{why}: {}", rig.events());
     }
     assert!(!list(&rig).is_touched());
     sign_all(&mut rig);
-    asked(&mut rig, 0, false, "Ann");
+    requested(&mut rig, 0, false, "Ann");
     rig.expect_event("it is signed already");
     rig.armed = true;
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
     rig.heartbeat();
-    asked(&mut rig, 0, true, "Ann");
+    requested(&mut rig, 0, true, "Ann");
     rig.expect_event("the vehicle is armed: disarm first");
 }
 
 #[test]
-fn a_value_must_keep_its_limits_when_it_is_signed_and_afterwards() {
+fn a_value_must_be_within_its_limits_when_it_is_signed_and_afterwards() {
     let mut rig = station(LIST, Role::Station);
     upright(&mut rig, 80.0);
-    asked(&mut rig, 1, false, "Bob");
+    requested(&mut rig, 1, false, "Bob");
     rig.expect_event("tilt is 10.0 deg, not at most 3 deg");
     upright(&mut rig, 89.0);
     sign_all(&mut rig);
@@ -217,8 +217,8 @@ fn a_value_must_keep_its_limits_when_it_is_signed_and_afterwards() {
     rig.run(3.0);
     let why = rig.model.why_checklist(rig.now).unwrap();
     assert!(why.contains("step 2 has no value"), "the tilt is old: {why}");
-    asked(&mut rig, 1, true, "Ann");
-    asked(&mut rig, 1, false, "Bob");
+    requested(&mut rig, 1, true, "Ann");
+    requested(&mut rig, 1, false, "Bob");
     rig.expect_event("the vehicle does not send its tilt now");
 }
 
@@ -227,7 +227,7 @@ fn a_voided_step_is_no_go_until_it_is_signed_again() {
     let mut rig = station(LIST, Role::Station);
     sign_all(&mut rig);
     // Anybody of the crew who may sign at all may void.
-    asked(&mut rig, 0, true, "Bob");
+    requested(&mut rig, 0, true, "Bob");
     assert!(!arms(&mut rig));
     rig.key(Key::Char('k'));
     let screen = rig.screen(80, 24);
@@ -235,7 +235,7 @@ fn a_voided_step_is_no_go_until_it_is_signed_again() {
         screen.contains("VOID  1 Range clear") && screen.contains("voided by Bob, 08:00 UTC"),
         "{screen}"
     );
-    asked(&mut rig, 0, false, "Ann");
+    requested(&mut rig, 0, false, "Ann");
     assert!(arms(&mut rig));
 }
 
@@ -250,7 +250,7 @@ fn after_the_liftoff_every_step_is_open_for_the_next_flight() {
     let flown = rig
         .actions
         .iter()
-        .filter(|action| matches!(action, Action::KeepChecklist(ChecklistEntry::Flown { .. })));
+        .filter(|action| matches!(action, Action::StoreChecklist(ChecklistEntry::Flown { .. })));
     assert_eq!(flown.count(), 1);
 }
 
@@ -266,7 +266,7 @@ fn the_checklist_of_another_mission_is_no_go() {
         let mut bytes = [0; 20];
         bytes[..3].copy_from_slice(name.as_bytes());
         let hash = MissionHash::of(name).0;
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+        rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA {
             hash,
             name: bytes.into(),
             start: TdStart::TD_START_PAD,
@@ -278,13 +278,13 @@ fn the_checklist_of_another_mission_is_no_go() {
 }
 
 #[test]
-fn an_attached_screen_asks_its_station_and_shows_what_the_station_says() {
+fn an_attached_screen_sends_its_request_and_shows_the_stations_answer() {
     let mut rig = station(LIST, Role::Attached);
     rig.keys(&[Key::Char('k'), Key::Char('G'), Key::Enter]);
     assert!(rig.actions.contains(&Action::Request(Request::Sign { step: 0, void: false })));
     assert!(!list(&rig).is_touched(), "only the station marks it");
     let mut at_the_station = station(LIST, Role::Station);
-    asked(&mut at_the_station, 0, false, "Ann");
+    requested(&mut at_the_station, 0, false, "Ann");
     rig.msg(Msg::Checklist(Box::new(list(&at_the_station).clone())));
     assert_eq!(list(&rig), list(&at_the_station));
     let mut watching = station(LIST, Role::Watching);

@@ -30,10 +30,10 @@ fn every_check_that_fails_while_it_is_armed_is_an_alarm_with_its_name_and_no_go(
         rig.checks_failed = check.bits();
         rig.run(0.2);
         let words = ground::model::words::check(name);
-        let is_told = check != TdCheck::TD_CHECK_UPLINK;
-        assert_eq!(is_alarmed(&rig, &format!("ARMED, and NO-GO: {words}")), is_told, "{name}");
-        assert_eq!(pad(&rig.model, rig.now).text == "NO-GO", is_told, "{name}");
-        if is_told {
+        let is_reported = check != TdCheck::TD_CHECK_UPLINK;
+        assert_eq!(is_alarmed(&rig, &format!("ARMED, and NO-GO: {words}")), is_reported, "{name}");
+        assert_eq!(pad(&rig.model, rig.now).text == "NO-GO", is_reported, "{name}");
+        if is_reported {
             for (columns, rows) in [(80, 24), (120, 40), (200, 60)] {
                 let screen = rig.screen(columns, rows);
                 assert!(screen.contains(&format!("ALARM ARMED, and NO-GO: {words}")), "{screen}");
@@ -69,7 +69,7 @@ fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again()
         rig.run(2.0);
         let words = if text_first || text_last { "no GNSS fix" } else { "gnss" };
         let screen = rig.screen(80, 24);
-        assert!(screen.contains(&format!("HOLD: {words}; start anew; disarms in 42 s")), "{screen}");
+        assert!(screen.contains(&format!("HOLD: {words}; start again; disarms in 42 s")), "{screen}");
         assert_eq!(pad(&rig.model, rig.now).text, "HOLD");
         // Another hold has its own check.
         rig.hold = TdHold::TD_HOLD_NONE;
@@ -77,7 +77,7 @@ fn a_hold_names_the_check_for_which_the_vehicle_held_also_when_it_passes_again()
         rig.checks_failed = TdCheck::TD_CHECK_FINS.bits();
         rig.hold = TdHold::TD_HOLD_CHECK_FAILED;
         rig.run(0.2);
-        rig.expect_screen("HOLD: fins; start anew");
+        rig.expect_screen("HOLD: fins; start again");
     }
 }
 
@@ -108,7 +108,7 @@ fn no_start_is_offered_or_sent_while_any_check_fails_and_the_line_names_it() {
 }
 
 #[test]
-fn the_pad_page_the_prompt_and_the_line_say_a_failing_check_in_the_vehicle_s_words() {
+fn the_pad_page_the_prompt_and_the_line_quote_the_vehicle_on_a_failing_check() {
     let mut rig = Rig::crewed();
     rig.checks_failed = (GNSS | TdCheck::TD_CHECK_SPEED).bits();
     rig.text("not ready: no GNSS fix for 3 s");
@@ -134,7 +134,7 @@ fn the_height_below_a_drone_counts_only_for_a_vehicle_that_hangs() {
     let all = TdCheck::all().iter().count();
     for (start, made) in [(TdStart::TD_START_PAD, all - 1), (TdStart::TD_START_DRONE, all)] {
         let mut rig = Rig::crewed();
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { start, ..TD_MISSION_DATA::default() }));
+        rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { start, ..TD_MISSION_DATA::default() }));
         rig.run(0.2);
         let screen = rig.screen(200, 60);
         assert!(screen.contains(&format!("{made} of {made} checks")), "{screen}");

@@ -84,7 +84,7 @@ impl Pad {
         }
     }
 
-    fn ask(&mut self, kind: CommandKind) {
+    fn request(&mut self, kind: CommandKind) {
         self.msg(Msg::command(kind, anna()));
     }
 
@@ -134,9 +134,9 @@ impl Pad {
     fn counting_until(delay_ms: u64, left_s: f64) -> Self {
         let mut pad = Self::with_delay(delay_ms);
         pad.run(2.5);
-        pad.ask(CommandKind::Arm);
+        pad.request(CommandKind::Arm);
         pad.run(1.5);
-        pad.ask(CommandKind::Start);
+        pad.request(CommandKind::Start);
         pad.run(1.1);
         while pad.left_s().expect("it counts down") > left_s {
             pad.pass_a_millisecond();
@@ -176,26 +176,26 @@ fn what_is_lost_before_t_minus_three_seconds_holds_and_what_is_lost_in_the_last_
 }
 
 #[test]
-fn nothing_is_armed_or_started_on_news_older_than_three_seconds() {
+fn no_arm_or_start_on_telemetry_older_than_three_seconds() {
     let mut pad = Pad::with_delay(3_000);
     pad.run(20.0);
     assert!(pad.model.link.state(pad.now).carries(), "frames arrive all the time");
     let why = why_not_arm(&pad.model, pad.now).expect("refused");
-    assert!(why.starts_with("what the vehicle said last is 6."), "{why}");
+    assert!(why.starts_with("the newest telemetry is 6."), "{why}");
     let (words, _) = readiness(&pad.model, pad.now).expect("checks");
-    assert!(words.starts_with("NO-GO: what the vehicle said last"), "{words}");
-    pad.ask(CommandKind::Arm);
+    assert!(words.starts_with("NO-GO: the newest telemetry"), "{words}");
+    pad.request(CommandKind::Arm);
     pad.run(7.0);
     assert!(!pad.vehicle.mode().interlocks.armed);
     // Armed before the way became long: nothing is started either.
     let mut pad = Pad::with_delay(20);
     pad.run(2.5);
-    pad.ask(CommandKind::Arm);
+    pad.request(CommandKind::Arm);
     pad.run(1.5);
     assert!(pad.vehicle.mode().interlocks.armed);
     pad.delay = Duration::from_secs(3);
     pad.run(10.0);
-    pad.ask(CommandKind::Start);
+    pad.request(CommandKind::Start);
     pad.run(4.0);
     assert_eq!(pad.left_s(), None);
 }
@@ -211,12 +211,12 @@ fn the_last_moment_of_a_hold_counts_the_round_trip() {
             break;
         }
     }
-    let last_s = pad.model.last_hold_s(&pad.model.vehicle).expect("told");
+    let last_s = pad.model.last_hold_s(&pad.model.vehicle).expect("reported");
     assert!((2.9..3.2).contains(&last_s), "{last_s}");
-    pad.ask(CommandKind::Hold);
+    pad.request(CommandKind::Hold);
     assert!(!pad.launches());
     let mut pad = Pad::counting_until(500, 2.4);
-    pad.ask(CommandKind::Hold);
+    pad.request(CommandKind::Hold);
     assert!(pad.launches(), "too late, and the screen says so");
     assert!(pad.model.last_hold_s(&pad.model.vehicle).is_some_and(|last_s| last_s > 2.9));
 }

@@ -130,7 +130,7 @@ fn a_countdown_without_a_commanding_screen_is_held() {
 
 /// At T-2 s nothing holds any more, and the station does not claim to.
 #[test]
-fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
+fn after_the_last_moment_no_hold_is_sent_and_that_is_reported() {
     let mut rig = counting();
     rig.expect_screen("; hold until T-2");
     rig.countdown_ms = 1_900;
@@ -149,7 +149,7 @@ fn after_the_last_moment_nothing_is_sent_and_it_is_said() {
     rig.run(2.0);
     assert_eq!(holds(&mut rig), 0);
     rig.expect_event("TOO LATE for a hold");
-    // Somebody at a screen is told what still works.
+    // A person at a screen reads what still works.
     rig.msg(Msg::Crew { seats: vec![anna()], silent: Vec::new() });
     rig.keys(&[Key::Char('H'), Key::Enter]);
     assert_eq!(holds(&mut rig), 0);

@@ -85,7 +85,7 @@ impl Screen {
         screen
     }
 
-    fn ask(&mut self, asked: &ToStation) {
+    fn request(&mut self, asked: &ToStation) {
         self.stream.write_all(&encode_to_station(asked)).expect("the daemon listens");
     }
 
@@ -98,8 +98,8 @@ impl Screen {
             self.stream.read_exact(&mut prefix).unwrap_or_else(|error| panic!("{what}: {error}"));
             let mut bytes = vec![0; u32::from_le_bytes(prefix) as usize];
             self.stream.read_exact(&mut bytes).unwrap_or_else(|error| panic!("{what}: {error}"));
-            let (told, at) = decode_to_screen(&bytes).expect("what a station tells");
-            match told {
+            let (message, at) = decode_to_screen(&bytes).expect("a message of the station");
+            match message {
                 ToScreen::Hello(hello) => {
                     assert!(hello.station.log_path.is_some_and(|path| path.ends_with("flight.mcap")));
                     self.model.settings.session = hello.station.session;
@@ -109,7 +109,7 @@ impl Screen {
                     self.now = at;
                     drop(update(&mut self.model, msg, at));
                 }
-                ToScreen::Status(_) | ToScreen::Stopping { .. } => panic!("nobody has asked"),
+                ToScreen::Status(_) | ToScreen::Stopping { .. } => panic!("an answer without a request"),
             }
         }
         panic!("{what} never came");
@@ -127,19 +127,19 @@ fn ready(screen: &Screen) -> bool {
 }
 
 #[test]
-fn screens_attach_and_detach_and_the_station_keeps_running() {
+fn screens_attach_and_detach_while_the_station_runs_on() {
     let mut daemon = Daemon::start();
     let mut watching = Screen::attach(&daemon.socket, true);
     assert_eq!(std::fs::metadata(&daemon.socket).unwrap().permissions().mode() & 0o777, 0o600);
     watching.until("ready", ready);
-    watching.ask(&ToStation::Request(Request::Command(CommandKind::Arm)));
+    watching.request(&ToStation::Request(Request::Command(CommandKind::Arm)));
     let mut first = Screen::attach(&daemon.socket, false);
     first.until("ready", ready);
     let before = first.now;
     first.until("two seconds more", |screen| screen.now > before + Duration::from_secs(2));
     assert!(!first.armed() && first.model.commands.tracks.is_empty(), "who only watches arms nothing");
-    first.ask(&ToStation::Key("A".to_owned()));
-    first.ask(&ToStation::Request(Request::Command(CommandKind::Arm)));
+    first.request(&ToStation::Key("A".to_owned()));
+    first.request(&ToStation::Request(Request::Command(CommandKind::Arm)));
     // Acknowledged and observed come in either order.
     first.until("armed", |screen| {
         screen.armed() && screen.model.commands.of(CommandKind::Arm).is_some_and(TrackedCommand::accepted)
@@ -151,11 +151,11 @@ fn screens_attach_and_detach_and_the_station_keeps_running() {
     watching.until("armed there, too", Screen::armed);
     daemon.signal("HUP");
     let mut second = Screen::attach(&daemon.socket, false);
-    assert!(second.armed(), "the history tells at once what was");
+    assert!(second.armed(), "the history shows at once what was");
     assert!(second.model.history.timeline.len() >= 2);
     let reports = &second.model.link.reports;
     assert!(reports.len() == 1 && reports[0].figures.rx_frames_s > 1.0, "the link's figures: {reports:?}");
-    second.ask(&ToStation::Request(Request::Command(CommandKind::Abort)));
+    second.request(&ToStation::Request(Request::Command(CommandKind::Abort)));
     drop(second);
     watching.until("aborted", |screen| screen.model.outcome.aborted_at.is_some());
     daemon.signal("TERM");
@@ -200,7 +200,7 @@ fn a_request_is_checked_again_by_the_station() {
     let request = |kind| Msg::command(kind, Seat::new(2, "anna"));
     let mut model = Model::new(settings(false, true));
     drop(update(&mut model, request(CommandKind::Arm), Duration::from_secs(1)));
-    assert!(model.commands.tracks.is_empty(), "nothing was heard of a vehicle yet");
+    assert!(model.commands.tracks.is_empty(), "no vehicle was received yet");
     let actions = update(&mut model, request(CommandKind::Abort), Duration::from_secs(1));
     assert!(actions.iter().any(|action| matches!(action, ground::update::Action::Send(_))));
 }

@@ -86,5 +86,5 @@ fn a_disarm_after_an_answered_arming_ends_with_its_first_answer() {
     rig.take_commands();
     rig.run(5.0);
     assert!(rig.take_commands().is_empty());
-    assert!(!rig.events().contains("ARM acknowledged, not observed"), "nobody expects it any more");
+    assert!(!rig.events().contains("ARM acknowledged, not observed"), "it is no longer expected");
 }

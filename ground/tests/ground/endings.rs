@@ -1,4 +1,4 @@
-//! How a flight ended, why its motor was inhibited, and a flight that nobody heard.
+//! How a flight ended, why its motor was inhibited, and a flight in silence.
 
 use ground::key::Key;
 use ground::model::Ending;
@@ -106,9 +106,9 @@ fn an_impact_with_a_parachute_that_did_not_fill_is_lost() {
     assert_eq!(hard.as_deref(), Some("HARD LANDING: it did not stay upright"));
 }
 
-/// A vehicle that tells no verdict, as one without a simulated world does.
+/// A vehicle that reports no verdict, as one without a simulated world does.
 #[test]
-fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
+fn without_a_verdict_only_an_open_parachute_is_claimed() {
     let mut rig = descending();
     rig.descent_with(3.0, -6.0, TdChute::TD_CHUTE_OPEN);
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
@@ -121,7 +121,7 @@ fn without_a_verdict_an_open_parachute_is_known_and_nothing_else_is_claimed() {
 }
 
 /// A vehicle that falls silent is in flight until it must be down; then it is lost until it is
-/// heard again.
+/// received again.
 #[test]
 fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     let mut rig = descending();
@@ -132,23 +132,23 @@ fn a_vehicle_that_fell_silent_in_flight_is_lost_once_it_must_be_down() {
     assert_eq!(ending(&rig), None);
     rig.run(60.0);
     assert_eq!(ending(&rig), Some(Ending::Lost));
-    assert!(reason(&rig).unwrap().starts_with(" LOST: it fell silent in flight and must be down"));
-    assert!(alarm_texts(&rig).iter().any(|text| text.starts_with("LOST: it fell silent")));
+    assert!(reason(&rig).unwrap().starts_with(" LOST: it went silent in flight and must be down"));
+    assert!(alarm_texts(&rig).iter().any(|text| text.starts_with("LOST: it went silent")));
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.motor = TdMotor::TD_MOTOR_HOT;
     rig.approach_wait_s = 20;
     rig.run(1.0);
-    assert_eq!(ending(&rig), None, "it is heard again");
+    assert_eq!(ending(&rig), None, "telemetry arrives again");
 }
 
-/// Until the canopy carries, no time is told: the speed is that of a fall.
+/// Until the canopy carries, no time is shown: the speed is that of a fall.
 #[test]
-fn no_time_is_told_before_the_canopy_carries() {
+fn no_time_is_shown_before_the_canopy_carries() {
     let mut rig = descending();
     rig.phase = TdPhase::TD_PHASE_CHUTE;
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
-    // The phase is told before the parachute is.
+    // The phase is reported before the parachute is.
     for chute in [TdChute::TD_CHUTE_STOWED, TdChute::TD_CHUTE_FIRED] {
         rig.descent_with(90.0, -40.0, chute);
         rig.state(4.0, 90.0, -0.6, -40.0, 88.0);
@@ -212,8 +212,8 @@ fn a_text_is_the_reason_of_a_latch_without_one() {
         alarms.iter().find(|alarm| alarm.what.text.starts_with("ABORT")).map(|alarm| alarm.what.text.clone())
     };
     assert_eq!(
-        latched("an old trouble", Some("LIFT-OFF that nobody asked for")).as_deref(),
-        Some("ABORT LATCHED: LIFT-OFF that nobody asked for")
+        latched("an old trouble", Some("LIFT-OFF without a command")).as_deref(),
+        Some("ABORT LATCHED: LIFT-OFF without a command")
     );
 }
 
@@ -233,7 +233,7 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     rig.run(1.6);
     assert_eq!(reason(&rig), None, "not yet");
     rig.run(12.2);
-    let words = " MAY BE IN THE AIR since T-0, unheard from T-1.8 s; meant to land within 120 m";
+    let words = " MAY BE IN THE AIR since T-0, silent since T-1.8 s; should land within 120 m";
     assert_eq!(reason(&rig).as_deref(), Some(words));
     assert!(is_on_pages(&mut rig, "123456789?ftx"));
     let state = rig.screen(80, 24).lines().nth(1).unwrap_or_default().to_owned();
@@ -244,7 +244,7 @@ fn a_countdown_that_ends_unheard_may_be_a_flight_on_every_page() {
     rig.key(Key::Char('f'));
     let find = rig.screen(80, 24);
     assert!(find.contains("120 m, the fence of its"), "{find}");
-    assert!(rig.events().contains("MAY BE IN THE AIR: not heard since T-1.8 s"), "{}", rig.events());
+    assert!(rig.events().contains("MAY BE IN THE AIR: no telemetry since T-1.8 s"), "{}", rig.events());
 }
 
 /// The link is back after the landing: the page of the lost vehicle knows what the verdict knows.
@@ -254,7 +254,7 @@ fn a_verdict_or_a_later_phase_means_that_the_vehicle_has_left_the_pad() {
     rig.run(40.0);
     rig.verdict_at(40.7);
     let place = rig.model.last_place(rig.now).expect("it has left the pad");
-    assert!((place.predicted.unwrap_or(place.heard).error_m - 42.0).abs() < 0.5, "{place:?}");
+    assert!((place.predicted.unwrap_or(place.received).error_m - 42.0).abs() < 0.5, "{place:?}");
     rig.speaks = true;
     rig.phase = TdPhase::TD_PHASE_TOUCHDOWN;
     rig.run(1.0);
@@ -276,7 +276,7 @@ fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
     rig.run(0.3);
-    assert_eq!(reason(&rig).as_deref(), Some(" LIFT-OFF that nobody commanded: TAKE COVER, look up"));
+    assert_eq!(reason(&rig).as_deref(), Some(" LIFT-OFF, uncommanded: TAKE COVER, look up"));
     assert!(is_on_pages(&mut rig, "123456789?ftx"));
     let abort = top_lines::abort(&rig.model, MONO, rig.now, 80).to_string();
     assert_eq!(abort, " abort now: ABORTED already: parachute at apogee");
@@ -287,7 +287,7 @@ fn a_liftoff_that_nobody_commanded_is_the_largest_word_of_every_page() {
     assert_eq!(reason(&rig), None);
 }
 
-/// The vehicle held its countdown in the silence: when it is heard again, nothing was in the air.
+/// The vehicle held its countdown in the silence: when telemetry returns, nothing was in the air.
 #[test]
 fn a_hold_in_the_silence_takes_the_warning_back() {
     let mut rig = unheard();
@@ -306,23 +306,23 @@ fn a_hold_in_the_silence_takes_the_warning_back() {
 
 /// The review begins with what the vehicle found, first in time; what has not arrived is said.
 #[test]
-fn the_review_says_what_went_wrong() {
+fn the_review_lists_what_went_wrong() {
     let sink = TdLimit::TD_LIMIT_VERTICAL_SPEED;
     let mut rig = judged([2.4, 0.3], TdLanding::empty(), sink, TdChute::TD_CHUTE_STOWED);
     rig.key(Key::Char('4'));
-    assert!(rig.screen(120, 36).contains("not told yet"), "{}", rig.screen(120, 36));
+    assert!(rig.screen(120, 36).contains("not reported yet"), "{}", rig.screen(120, 36));
     rig.finding(1, 3, 15.75, "landing motor's impulse 0.867 of the mission's");
     rig.finding(0, 3, 21.5, "no plan that lands for 1.2 s\u{1b}[2J");
     for (columns, rows) in [(80, 24), (120, 36), (200, 50)] {
         let screen = rig.screen(columns, rows);
         let [impulse, plan, more] =
-            ["T+15.8", "T+21.5", "1 more not heard yet"].map(|part| screen.find(part));
+            ["T+15.8", "T+21.5", "1 more not received yet"].map(|part| screen.find(part));
         assert!(impulse.is_some() && impulse < plan && plan < more, "{screen}");
         assert!(screen.contains("what went wrong") && screen.contains("landing motor's"), "{screen}");
         assert!(!screen.contains('\u{1b}'), "{screen}");
     }
     rig.finding(2, 3, 25.0, "battery down to 6.50 V");
-    assert!(!rig.screen(120, 36).contains("not heard yet"));
+    assert!(!rig.screen(120, 36).contains("not received yet"));
 
     let mut rig = judged([0.4, 0.1], TdLanding::all(), TdLimit::empty(), TdChute::TD_CHUTE_STOWED);
     rig.finding(0, 0, 0.0, "");

@@ -23,7 +23,7 @@ fn the_palette_lists_every_action_with_its_key() {
         let entry = listed.iter().find(|entry| entry.action == PaletteAction::Act(definition.act)).unwrap();
         assert_eq!((entry.words.as_str(), &entry.key), (definition.words, &definition.key.name()));
     }
-    assert!(listed.iter().any(|entry| entry.action == PaletteAction::TellAbort && entry.key == "Ctrl-X"));
+    assert!(listed.iter().any(|entry| entry.action == PaletteAction::ExplainAbort && entry.key == "Ctrl-X"));
     for quantity in &quantity::ALL {
         assert!(listed.iter().any(|entry| entry.action == PaletteAction::Plot(quantity)));
     }
@@ -74,7 +74,7 @@ fn a_held_enter_confirms_nothing_that_the_palette_opened() {
 }
 
 #[test]
-fn the_palette_only_tells_how_to_abort() {
+fn the_palette_only_explains_how_to_abort() {
     let mut rig = powered();
     rig.take_commands();
     choose(&mut rig, "abort");

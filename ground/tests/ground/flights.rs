@@ -56,7 +56,7 @@ fn mk2(number: u64, asks: impl Fn(&Vehicle) -> Option<CrewCommand>) -> Vec<(Dura
 }
 
 /// The model of a ground station that has received the flight up to a time.
-fn heard_until(flight: &[(Duration, Frame)], end: Duration) -> Model {
+fn received_until(flight: &[(Duration, Frame)], end: Duration) -> Model {
     let mut model = Model::new(settings(false, true));
     let mut tick = Duration::ZERO;
     for (at, frame) in flight.iter().take_while(|(at, _)| *at <= end) {
@@ -87,7 +87,7 @@ fn the_true_path_stays_inside_the_error_circle_in_19_of_20_cases() {
         let flight = frames_of(number);
         let halves = u32::try_from(flight.last().expect("it speaks").0.as_millis() / 500).unwrap();
         let heard: Vec<(Duration, Model)> =
-            (0..=halves).map(|k| (half * k, heard_until(&flight, half * k))).collect();
+            (0..=halves).map(|k| (half * k, received_until(&flight, half * k))).collect();
         for (lost_at, known) in &heard {
             for (now, later) in heard.iter().filter(|(now, _)| now > lost_at) {
                 let Some(predicted) = predict_position(&known.vehicle, *now) else { continue };
@@ -108,8 +108,8 @@ fn the_true_path_stays_inside_the_error_circle_in_19_of_20_cases() {
 /// Whatever the screen says of the time under the parachute has to come true, and it says it as
 /// soon as the canopy carries.
 #[test]
-fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
-    let mut told = 0;
+fn the_predicted_time_under_the_parachute_is_the_flown_time() {
+    let mut reported = 0;
     for (number, below_m) in [(0, 1_000.0), (1, 200.0), (2, 150.0)] {
         let flight = mk2(number, |rocket| {
             let falls = rocket.phase().in_descent();
@@ -129,21 +129,21 @@ fn the_time_that_is_told_under_the_parachute_is_the_time_that_is_flown() {
             carried_since.get_or_insert(now);
             let line = status_lines::next_event(&model, now, false).expect("it flies");
             let (_, rest) = line.split_once("ground in ").unwrap_or_else(|| panic!("{line}"));
-            let told_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
+            let reported_s: f64 = rest.split(' ').next().unwrap_or_default().parse().expect("seconds");
             let flown_s = down.saturating_sub(now).as_secs_f64();
             let settled = now.checked_sub(carried_since.unwrap()) > Some(Duration::from_secs(2));
             // The canopy still brakes when it begins to carry, and gusts and the estimated height
-            // move what is told.
+            // move the shown time.
             let share = if settled { 0.15 } else { 0.5 };
             assert!(
-                (told_s - flown_s).abs() <= share * flown_s + 1.0,
+                (reported_s - flown_s).abs() <= share * flown_s + 1.0,
                 "flight {number}, {flown_s:.1} s before the ground: {line}"
             );
-            told += 1;
+            reported += 1;
         }
         assert!(carried_since.is_some(), "flight {number}: the canopy never carried");
     }
-    assert!(told > 1_000, "{told}");
+    assert!(reported > 1_000, "{reported}");
 }
 
 /// When the vehicle says that it has touched down.

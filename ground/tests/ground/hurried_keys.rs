@@ -66,7 +66,7 @@ fn type_over(rig: &mut Rig, connection: &Connection, keys: &[Key], apart_ms: &[u
     }
 }
 
-/// Ten ticks a second, and the vehicle is heard.
+/// Ten ticks a second, and telemetry arrives.
 fn pass_until(rig: &mut Rig, at: Duration) {
     while rig.now + Duration::from_millis(100) <= at {
         rig.now += Duration::from_millis(100);
@@ -85,14 +85,14 @@ fn pass(rig: &mut Rig, time: Duration) {
 
 /// Presses the key that the screen asks for, if it asks, as a person does who has read it.
 fn answer_the_question(rig: &mut Rig) -> bool {
-    let asked = rig.model.dialog.as_ref().is_some_and(|dialog| dialog.again_from.is_some());
-    if asked {
+    let prompted = rig.model.dialog.as_ref().is_some_and(|dialog| dialog.again_from.is_some());
+    if prompted {
         let screen = rig.screen(80, 24);
         assert!(screen.contains("DID YOU TYPE THIS?") && screen.contains("Ctrl-Y within"), "{screen}");
         pass(rig, AGAIN_AFTER);
         rig.press(Key::CtrlY);
     }
-    asked
+    prompted
 }
 
 fn is_start(command: &protocol::dialect::COMMAND_LONG_DATA) -> bool {
@@ -100,7 +100,7 @@ fn is_start(command: &protocol::dialect::COMMAND_LONG_DATA) -> bool {
 }
 
 #[test]
-fn the_question_needs_its_own_key_after_a_pause() {
+fn the_second_confirmation_needs_a_different_key_after_a_pause() {
     for key in [Key::Enter, Key::Char('y'), Key::Char('Y'), Key::Escape, Key::Char(' '), Key::Up] {
         let mut rig = Rig::crewed();
         rig.msg(Msg::Keys(ladder()));
@@ -125,7 +125,7 @@ fn the_question_needs_its_own_key_after_a_pause() {
     assert!(!rig.take_commands().iter().any(is_arm) && rig.events().contains("arming: time is up"));
 }
 
-/// Whatever stops something is not asked again.
+/// A key that stops something needs no second confirmation.
 #[test]
 fn hold_and_disarm_act_at_any_speed() {
     for (key, command) in
@@ -188,7 +188,7 @@ fn what_is_left_of_a_refused_word_does_nothing() {
     {
         let mut rig = if armed { armed_on_pad() } else { Rig::crewed() };
         rig.checks_failed = TdCheck::TD_CHECK_PIN.bits();
-        rig.hears = armed;
+        rig.uplink_alive = armed;
         rig.run(6.0);
         rig.take_commands();
         let page = rig.model.page();
@@ -260,10 +260,10 @@ proptest! {
         let mut rig = if start { armed_on_pad() } else { Rig::crewed() };
         rig.take_commands();
         type_over(&mut rig, &connection, &if start { start_ladder() } else { ladder() }, &apart_ms);
-        let asked = answer_the_question(&mut rig);
+        let prompted = answer_the_question(&mut rig);
         let sent = rig.take_commands();
         let count = sent.iter().filter(|sent| if start { is_start(sent) } else { is_arm(sent) }).count();
-        prop_assert_eq!(count, 1, "asked again: {}\n{}", asked, rig.events());
+        prop_assert_eq!(count, 1, "second confirmation: {}\n{}", prompted, rig.events());
     }
 
     /// The keys of an abort act whatever comes with them.

@@ -130,7 +130,7 @@ fn stands_on_every_page(rig: &mut Rig, words: &str, reason: &str) {
 /// After a failed ignition, an inhibit or an abort: on every page and size, as an alarm and in the
 /// log.
 #[test]
-fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
+fn a_live_motor_after_a_flight_forbids_the_approach_until_it_is_safe() {
     for locks in [
         TdInterlock::TD_INTERLOCK_NO_LIGHT,
         TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED,
@@ -165,7 +165,7 @@ fn a_live_motor_after_a_flight_keeps_people_away_until_it_is_safe() {
     }
 }
 
-/// The station has not heard the abort: the vehicle says that the pin is due.
+/// The station has not received the abort: the vehicle reports that the pin is due.
 #[test]
 fn the_pin_is_due_on_every_page_after_a_power_cycle_until_it_was_put_in() {
     let mut rig = Rig::crewed();
@@ -206,7 +206,7 @@ fn each_state_of_the_motor_has_its_warning() {
 
 /// Whoever ends the station takes the words away.
 #[test]
-fn a_station_is_not_stopped_by_a_slip_while_people_must_keep_away() {
+fn a_station_is_not_stopped_by_a_slip_while_people_must_stay_away() {
     let mut rig = down(TdMotor::TD_MOTOR_HOT, 20, TdInterlock::empty());
     let why = why_not_stop(&rig.model, rig.now).unwrap_or_default();
     assert_eq!(why, "people must keep away, DO NOT APPROACH for 20 s: MOTOR HOT, burnt out");
@@ -221,13 +221,13 @@ fn a_station_is_not_stopped_by_a_slip_while_people_must_keep_away() {
 
 /// Without `--mission` only the crew can compare it with what they mean to fly.
 #[test]
-fn the_pad_page_names_the_mission_that_the_vehicle_tells() {
+fn the_pad_page_names_the_reported_mission() {
     let mut rig = Rig::crewed();
     assert!(!rig.screen(80, 24).contains("from pad"), "{}", rig.screen(80, 24));
     let mut name = [0; 20];
     name[..3].copy_from_slice(b"mk2");
     let hash = MissionHash::of("a text");
-    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+    rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA {
         hash: hash.0,
         name: name.into(),
         start: TdStart::TD_START_PAD,
@@ -264,9 +264,9 @@ fn a_waiting_time_goes_on_without_the_link() {
     assert_eq!(reason(&rig).as_deref(), Some("~do not approach: LIVE MOTOR"), "unknown stays unknown");
 }
 
-/// In flight nobody approaches, and the pages show the flight.
+/// In flight no person approaches, and the pages show the flight.
 #[test]
-fn nothing_is_said_of_approaching_in_flight_or_while_the_vehicle_is_being_prepared() {
+fn no_approach_headline_in_flight_or_while_the_vehicle_is_being_prepared() {
     let mut rig = Rig::crewed();
     assert_eq!(reason(&rig), None);
     rig.phase = TdPhase::TD_PHASE_CHUTE;
@@ -288,13 +288,13 @@ fn a_hold_shows_its_reason_and_what_happens_next() {
     rig.run(1.0);
     rig.hold = TdHold::TD_HOLD_UPLINK_SILENT;
     rig.run(0.2);
-    let words = "HOLD: the vehicle did not hear this station for 1 s; start anew; disarms in 42 s";
+    let words = "HOLD: no uplink from this station for 1 s; start again; disarms in 42 s";
     assert!(rig.screen(80, 24).contains(words), "{}", rig.screen(80, 24));
     assert!(rig.events().contains(words));
     assert_eq!(rig.events().matches("HOLD").count(), 1);
     rig.hold = TdHold::TD_HOLD_COMMANDED;
     rig.run(0.2);
-    assert!(rig.screen(80, 24).contains("HOLD: a station asked for it; start anew"));
+    assert!(rig.screen(80, 24).contains("HOLD: a station requested it; start again"));
     rig.hold = TdHold::TD_HOLD_NONE;
     rig.run(0.2);
     assert!(!rig.screen(80, 24).contains("\"HOLD: a station"));
@@ -306,7 +306,7 @@ fn an_unknown_vehicle_counts_as_live() {
     let mut rig = Rig::crewed();
     rig.model = ground::model::Model::new(settings(false, true));
     rig.heartbeat();
-    rig.hear(&protocol::dialect::MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+    rig.receive(&protocol::dialect::MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
         phase: TdPhase::TD_PHASE_PAD_IDLE,
         ..TD_FLIGHT_STATUS_DATA::default()
     }));

@@ -330,7 +330,7 @@ proptest! {
     /// Held keys, pastes, random bytes, near misses and whole ladders, in any order, with an armed
     /// or disarmed vehicle.
     #[test]
-    fn nothing_happens_without_its_whole_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
+    fn no_command_without_its_complete_ladder(streams in prop::collection::vec(stream(), 1..25), armed in any::<bool>()) {
         let mut rig = if armed { armed_on_pad() } else { Rig::crewed() };
         rig.take_commands();
         let mut watched = Watched { rig, history: Vec::new() };
@@ -361,7 +361,7 @@ proptest! {
 
     /// The same ladder on an attached screen, which sends a request instead of a command.
     #[test]
-    fn an_attached_screen_asks_to_arm_only_after_the_complete_ladder(
+    fn an_attached_screen_requests_an_arming_only_after_the_complete_ladder(
         steps in prop::collection::vec((some_keys(), 0_u64..4_000), 1..40),
     ) {
         let mut rig = Rig::crewed();

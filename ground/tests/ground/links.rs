@@ -32,7 +32,7 @@ fn report(name: &str, loss: f64, trouble: Option<&str>) -> LinkReport {
 }
 
 #[test]
-fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
+fn several_links_are_shown_side_by_side_and_an_answer_names_its_link() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('5'));
     let links = |trouble| {
@@ -45,7 +45,7 @@ fn several_links_are_shown_side_by_side_and_an_answer_names_its_own() {
     assert!(screen.contains("all links") && screen.contains(" 1590/5760 "), "{screen}");
     rig.msg(links(Some("unplugged")));
     assert!(rig.screen(140, 40).contains("serial:/dev/x:57600 DOWN unplugged"));
-    rig.msg(Msg::LinkSays("one link down: /dev/x: unplugged".to_owned()));
+    rig.msg(Msg::LinkWarning("one link down: /dev/x: unplugged".to_owned()));
     rig.expect_event("one link down");
     assert!(!rig.model.alarms.is_unseen(AlarmKind::LinkDown), "the other still works");
 }
@@ -129,11 +129,11 @@ fn every_message_has_its_age() {
     rig.key(Key::Char('5'));
     let shows = |rig: &Rig, what: &str| lines(rig).iter().any(|line| line.contains(what));
     assert!(shows(&rig, "SYS_STATUS never"), "{}", rig.screen(80, 40));
-    rig.hear(&MavMessage::SYS_STATUS(SYS_STATUS_DATA::default()));
+    rig.receive(&MavMessage::SYS_STATUS(SYS_STATUS_DATA::default()));
     rig.text("ready");
     // Messages of another component do not count.
     let other = Address { system_id: 1, component_id: 2 };
-    rig.hear_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+    rig.receive_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
     rig.run(1.7);
     for age in ["SYS_STATUS ~1.7 s", "STATUSTEXT ~1.7 s", "HEARTBEAT 0.7 s"] {
         assert!(shows(&rig, age), "{age}: {}", rig.screen(80, 40));

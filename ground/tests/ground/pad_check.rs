@@ -40,14 +40,14 @@ fn values() -> [Value; 9] {
     ]
 }
 
-/// The vehicle tells the first values of a check.
-fn tell(rig: &mut Rig, run: u16, state: State, found: usize) {
-    tell_values(rig, run, state, &values()[..found]);
+/// The vehicle reports the first values of a check.
+fn report(rig: &mut Rig, run: u16, state: State, found: usize) {
+    report_values(rig, run, state, &values()[..found]);
 }
 
-fn tell_values(rig: &mut Rig, run: u16, state: State, values: &[Value]) {
+fn report_values(rig: &mut Rig, run: u16, state: State, values: &[Value]) {
     for (place, (item, value, least, most, verdict)) in values.iter().copied().enumerate() {
-        rig.hear(&MavMessage::TD_PAD_CHECK(TD_PAD_CHECK_DATA {
+        rig.receive(&MavMessage::TD_PAD_CHECK(TD_PAD_CHECK_DATA {
             boot_number: 0,
             time_boot_ms: rig.boot_ms(),
             value,
@@ -66,12 +66,12 @@ fn tell_values(rig: &mut Rig, run: u16, state: State, values: &[Value]) {
 }
 
 fn supply(rig: &mut Rig, millivolts: u16, percent: i8, space_mib: f32) {
-    rig.hear(&MavMessage::SYS_STATUS(SYS_STATUS_DATA {
+    rig.receive(&MavMessage::SYS_STATUS(SYS_STATUS_DATA {
         voltage_battery: millivolts,
         battery_remaining: percent,
         ..SYS_STATUS_DATA::default()
     }));
-    rig.hear(&MavMessage::STORAGE_INFORMATION(STORAGE_INFORMATION_DATA {
+    rig.receive(&MavMessage::STORAGE_INFORMATION(STORAGE_INFORMATION_DATA {
         time_boot_ms: rig.boot_ms(),
         available_capacity: space_mib,
         ..STORAGE_INFORMATION_DATA::default()
@@ -103,12 +103,12 @@ fn a_check_takes_a_letter_and_enter_and_the_same_letter_ends_it() {
     rig.run(3.0);
     assert!(checks(&mut rig).is_empty(), "it is never repeated");
     rig.answer(CHECK, 0);
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 2);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 2);
     rig.expect_screen("CHECK 1 RUNS 40 %: hands off");
     rig.key(Key::Char('X'));
     assert_eq!(checks(&mut rig), [0.0], "at once");
     rig.answer(CHECK, 0);
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_STOPPED, 2);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_STOPPED, 2);
     rig.expect_screen("CHECK 1 STOPPED early");
     rig.keys(&[Key::Char('X'), Key::Enter]);
     assert!(checks(&mut rig).is_empty(), "pressed to end it, a moment too late");
@@ -130,12 +130,12 @@ fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('x'));
     rig.keys(&[Key::Char('Y')]);
-    rig.expect_event("no check of servos that tell nothing has passed");
+    rig.expect_event("no check of servos without feedback has passed");
     rig.run(3.0);
-    tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
+    report_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, &silent[..1]);
     let words = "gimbal pitch nozzle swings towards fins 1 and 4, then towards 2 and 3";
     rig.expect_screen(words);
-    tell_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_PASSED, &silent);
+    report_values(&mut rig, 1, State::TD_PAD_CHECK_STATE_PASSED, &silent);
     let screen = rig.screen(80, 24);
     assert!(screen.contains("CHECK 1 PASSED but for what only people see"), "{screen}");
     assert!(screen.contains("fin 4        fin 4 alone opens fully, then closes"), "{screen}");
@@ -150,7 +150,7 @@ fn what_only_people_see_is_on_the_page_and_takes_a_letter_and_a_word() {
 }
 
 #[test]
-fn the_letter_ends_a_check_of_which_nothing_was_heard() {
+fn the_letter_ends_a_check_without_a_report() {
     let mut rig = Rig::crewed();
     rig.keys(&[Key::Char('X'), Key::Enter]);
     assert_eq!(checks(&mut rig), [1.0]);
@@ -161,7 +161,7 @@ fn the_letter_ends_a_check_of_which_nothing_was_heard() {
 }
 
 #[test]
-fn an_armed_or_a_flying_vehicle_is_not_asked() {
+fn an_armed_or_a_flying_vehicle_gets_no_check_request() {
     let mut rig = Rig::crewed();
     rig.armed = true;
     rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
@@ -184,10 +184,10 @@ fn every_value_is_shown_with_its_limit_and_the_book_has_the_verdict() {
     let screen = rig.screen(80, 24);
     assert!(screen.contains("no check yet") && screen.contains("battery 8.31 V, 97 %"), "{screen}");
     assert!(screen.contains("vehicle's log 3072 MiB free"), "{screen}");
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 4);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 4);
     assert!(!entered(&rig).contains("check of the vehicle"), "not before its end");
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
     insta::assert_snapshot!("pad_check_failed_80x24", rig.screen(80, 24));
     let book = entered(&rig);
     assert_eq!(book.matches("check of the vehicle").count(), 1, "{book}");
@@ -195,7 +195,7 @@ fn every_value_is_shown_with_its_limit_and_the_book_has_the_verdict() {
     assert!(book.contains(words), "{book}");
     rig.expect_event(words);
     // Another check forgets the values of this one.
-    tell(&mut rig, 2, State::TD_PAD_CHECK_STATE_RUNNING, 1);
+    report(&mut rig, 2, State::TD_PAD_CHECK_STATE_RUNNING, 1);
     assert!(!rig.screen(80, 24).contains("NO 0.0"), "{}", rig.screen(80, 24));
 }
 
@@ -204,11 +204,11 @@ fn every_value_is_shown_with_its_limit_and_the_book_has_the_verdict() {
 fn the_failures_of_a_check_are_a_value_like_any_other() {
     let failures = ground::model::quantity::Quantity::named("check failures").unwrap();
     let mut rig = Rig::crewed();
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 4);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_RUNNING, 4);
     assert!(failures.read(&rig.model, rig.now).is_none());
-    tell(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
+    report(&mut rig, 1, State::TD_PAD_CHECK_STATE_FAILED, 9);
     assert_eq!(failures.read(&rig.model, rig.now).map(|sample| sample.value), Some(3.0));
-    tell(&mut rig, 2, State::TD_PAD_CHECK_STATE_STOPPED, 4);
+    report(&mut rig, 2, State::TD_PAD_CHECK_STATE_STOPPED, 4);
     assert!(failures.read(&rig.model, rig.now).is_none());
 }
 
@@ -246,7 +246,7 @@ fn range_test(rig: &mut Rig, unanswered_of: usize) {
     let mut questions = 0;
     for _ in 0..340 {
         rig.run(0.1);
-        let asked: Vec<TIMESYNC_DATA> = rig
+        let requests: Vec<TIMESYNC_DATA> = rig
             .actions
             .drain(..)
             .filter_map(|action| match action {
@@ -257,10 +257,10 @@ fn range_test(rig: &mut Rig, unanswered_of: usize) {
                 _ => None,
             })
             .collect();
-        for sync in asked {
+        for sync in requests {
             questions += 1;
             if unanswered_of == 0 || questions % unanswered_of != 0 {
-                rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA {
+                rig.receive(&MavMessage::TIMESYNC(TIMESYNC_DATA {
                     tc1: 1,
                     target_system: GROUND.system_id,
                     target_component: GROUND.component_id,
@@ -268,7 +268,7 @@ fn range_test(rig: &mut Rig, unanswered_of: usize) {
                 }));
             }
         }
-        rig.hear_from(
+        rig.receive_from(
             Address { system_id: 51, component_id: 68 },
             &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA {
                 rssi: 110,

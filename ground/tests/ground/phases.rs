@@ -71,7 +71,7 @@ fn regress_silence() {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     rig.run(1.0);
-    snapshot("nothing_heard", &rig);
+    snapshot("no_vehicle", &rig);
 }
 
 /// A vehicle in space, in this phase, with this abort effect.
@@ -115,10 +115,10 @@ fn regress_land_armed() {
     snapshot("land_armed", &rig);
 }
 
-/// What the vehicle tells of its gate: above the band, with a fin that is 6 degrees behind, and not
-/// yet armed it waits for three.
+/// The reported state of the gate: above the band, with a fin that is 6 degrees behind, and not yet
+/// armed it waits for three.
 #[test]
-fn the_gate_waits_for_what_the_vehicle_tells() {
+fn the_gate_waits_for_the_reported_values() {
     let mut rig = descending();
     rig.limits();
     let waits = |rig: &Rig| rig.screen(120, 36).matches("wait ").count();

@@ -50,7 +50,7 @@ fn no_go() -> Rig {
 fn with_events() -> Rig {
     let mut rig = on_the_pad();
     for text in
-        ["self-test passed", "the log runs", "plan: a landing is rehearsed", "igniter closed", "uplink heard"]
+        ["self-test passed", "the log runs", "plan: a landing is rehearsed", "igniter closed", "uplink alive"]
     {
         rig.text(text);
     }
@@ -64,7 +64,7 @@ fn with_checklist() -> Rig {
     let list = ground::model::parse_checklist(include_str!("../../checklist-example.toml"));
     rig.msg(Msg::Checklist(Box::new(list.expect("the example is a checklist"))));
     for (step, void) in [(0, false), (1, false), (3, false), (1, true)] {
-        rig.msg(Msg::Asked { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });
+        rig.msg(Msg::Requested { request: Request::Sign { step, void }, by: Seat::new(2, "Ann") });
     }
     rig.key(Key::Char('k'));
     rig.run(1.0);
@@ -391,8 +391,8 @@ fn no_key_disarms_in_flight() {
     }
 }
 
-/// A moment of the recorded flight: a station that has heard everything up to it, and the vehicle's
-/// last words.
+/// A moment of the recorded flight: a station that has received everything up to it, and the
+/// vehicle's last words.
 struct Moment {
     rig: Rig,
     phase: TdPhase,

@@ -64,7 +64,7 @@ fn a_start_that_fails_leaves_no_files() {
 }
 
 #[test]
-fn nothing_heard_is_code_5() {
+fn a_silent_link_is_code_5() {
     let directory = tempfile::tempdir().unwrap();
     let arguments = ["--connect", "udpin:127.0.0.1:0", "--timeout-s", "0.3", "--log", "none"];
     let output = ground(directory.path(), &arguments);
@@ -181,7 +181,7 @@ fn the_end_of_a_run_is_one_object() {
     let directory = tempfile::tempdir().unwrap();
     let output =
         ground(directory.path(), &["--json", "--start", "apogee", "--speed", "4", "--log", "f.mcap"]);
-    let told: serde_json::Value = serde_json::from_str(&out(&output)).unwrap();
-    assert_eq!((&told["exit_code"], &told["stands"]), (&0.into(), &true.into()), "{told}");
-    assert_eq!(told["log"], "f.mcap", "{told}");
+    let report: serde_json::Value = serde_json::from_str(&out(&output)).unwrap();
+    assert_eq!((&report["exit_code"], &report["stands"]), (&0.into(), &true.into()), "{report}");
+    assert_eq!(report["log"], "f.mcap", "{report}");
 }

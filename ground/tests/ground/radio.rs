@@ -20,11 +20,11 @@ fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
     let radio = Address { system_id: 51, component_id: 68 };
     for _ in 0..40 {
         rig.run(0.1);
-        rig.hear_from(radio, &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA::default()));
+        rig.receive_from(radio, &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA::default()));
     }
     assert!(matches!(rig.model.link.state(rig.now), LinkState::Lost(_)));
     rig.expect_event("LINK LOST");
-    rig.hear_from(
+    rig.receive_from(
         radio,
         &MavMessage::RADIO_STATUS(RADIO_STATUS_DATA {
             rssi: 190,
@@ -47,7 +47,7 @@ fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
 fn other_systems_change_nothing() {
     let mut rig = Rig::crewed();
     let other = Address { system_id: 2, component_id: 1 };
-    rig.hear_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 9, ..Default::default() }));
+    rig.receive_from(other, &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 9, ..Default::default() }));
     assert_eq!(rig.model.vehicle.phase().map(|phase| phase.value), Some(TdPhase::TD_PHASE_PAD_IDLE));
     rig.expect_event("system 2 component 1");
 }
@@ -68,14 +68,14 @@ fn a_reboot_drops_old_values() {
 #[test]
 fn timesync_is_answered_and_the_round_trip_is_shown() {
     let mut rig = Rig::crewed();
-    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 77, ..Default::default() }));
+    rig.receive(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 0, ts1: 77, ..Default::default() }));
     let answers = |message: &MavMessage| matches!(message, MavMessage::TIMESYNC(data) if data.ts1 == 77 && data.tc1 != 0);
     let answered =
         rig.actions.iter().any(|action| matches!(action, Action::Send(message) if answers(message)));
     assert!(answered);
-    let asked_at = i64::try_from(rig.now.as_nanos()).unwrap();
+    let requested_at = i64::try_from(rig.now.as_nanos()).unwrap();
     rig.run(0.2);
-    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: asked_at, ..Default::default() }));
+    rig.receive(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1: requested_at, ..Default::default() }));
     rig.key(Key::Char('5'));
     rig.expect_screen("round trip 200 ms");
 }
@@ -94,16 +94,16 @@ fn only_questions_to_this_station_are_answered() {
         let data = TIMESYNC_DATA { tc1: 0, ts1: 77, target_system, target_component };
         MavMessage::TIMESYNC(data)
     };
-    for asked in [timesync(0, 0), timesync(255, 190)] {
-        rig.hear(&asked);
-        assert_eq!(answers(&mut rig), 1, "{asked:?}");
+    for sent in [timesync(0, 0), timesync(255, 190)] {
+        rig.receive(&sent);
+        assert_eq!(answers(&mut rig), 1, "{sent:?}");
     }
     for other in [timesync(254, 190), timesync(255, 1)] {
-        rig.hear(&other);
+        rig.receive(&other);
         assert_eq!(answers(&mut rig), 0, "{other:?}");
     }
     let another_grounds = TIMESYNC_DATA { tc1: 5, ts1: 1, target_system: 254, target_component: 190 };
-    rig.hear(&MavMessage::TIMESYNC(another_grounds));
+    rig.receive(&MavMessage::TIMESYNC(another_grounds));
     assert_eq!(rig.model.link.round_trip, None);
 }
 
@@ -151,7 +151,7 @@ fn a_run_without_a_screen_ends_when_the_link_stays_lost() {
     let mut rig = Rig::new(settings(true, false));
     rig.speaks = false;
     rig.run(11.0);
-    assert!(rig.wants_to_quit(), "nothing was ever heard");
+    assert!(rig.wants_to_quit(), "nothing was ever received");
     let mut rig = Rig::new(settings(false, false));
     rig.phase = TdPhase::TD_PHASE_POWERED;
     rig.run(2.0);
@@ -198,7 +198,7 @@ proptest! {
         let mut rig = Rig::crewed();
         rig.speaks = false;
         for (id, payload, pause_ms) in frames {
-            rig.hear_payload(id, &payload);
+            rig.receive_payload(id, &payload);
             rig.run((pause_ms / 100) as f64 / 10.0);
         }
         rig.screen(columns, rows);
@@ -223,7 +223,7 @@ proptest! {
     fn any_text_is_shown_without_controls(text in prop::collection::vec(any::<u8>(), 50)) {
         let mut rig = Rig::crewed();
         let text: [u8; 50] = text.try_into().unwrap_or([0; 50]);
-        rig.hear(&MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: text.into(), ..Default::default() }));
+        rig.receive(&MavMessage::STATUSTEXT(STATUSTEXT_DATA { text: text.into(), ..Default::default() }));
         let screen = rig.screen(80, 24);
         prop_assert!(!screen.chars().any(|c| c.is_control() && c != '\n'));
     }

@@ -55,8 +55,9 @@ fn in_every_state(rig: &mut Rig, kind: CommandKind, mut see: impl FnMut(&str, &R
     let is_ours = |rig: &Rig| {
         rig.model.commands.tracks.iter().position(|track| track.kind == kind).expect("it was commanded")
     };
-    for state in
-        [A::Waiting, A::InProgress, A::Asked, A::GivenUp].into_iter().chain([0, 1, 3, 5, 9].map(A::Answered))
+    for state in [A::Waiting, A::InProgress, A::AwaitsConfirmation, A::GivenUp]
+        .into_iter()
+        .chain([0, 1, 3, 5, 9].map(A::Answered))
     {
         for (observed, is_withdrawn) in [(None, false), (None, true), (Some(now), false)] {
             let place = is_ours(rig);
@@ -124,7 +125,7 @@ fn every_command_in_every_state_can_be_read_at_every_danger_in_every_theme() {
 
 /// An abort that is begun, and one that is kept for the next station.
 #[test]
-fn a_begun_and_a_kept_abort_can_be_read_at_every_danger_in_every_theme() {
+fn a_begun_and_an_unsent_abort_can_be_read_at_every_danger_in_every_theme() {
     for (danger, rig) in dangers() {
         let mut kept = rig;
         kept.model.link.abort_unsent = true;

@@ -185,7 +185,7 @@ fn recorded_commands_are_shown() {
 }
 
 #[test]
-fn a_tlog_is_known_by_its_content_and_played_around_its_damage() {
+fn a_tlog_is_recognised_by_its_content_and_played_around_its_damage() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("flight.mcap");
     let (mut vehicle, mut ground) = (Encoder::new(VEHICLE), Encoder::new(GROUND));

@@ -196,7 +196,7 @@ fn regress_help() {
 
 /// Phase, armed, countdown, link and the abort key do not move when a dialog opens.
 #[test]
-fn the_top_lines_keep_their_place() {
+fn the_top_lines_do_not_move() {
     // The middle of the second line is what comes next, or whether the vehicle may be armed.
     let state = |line: &str| line.chars().take(34).collect::<String>();
     let top = |rig: &Rig| {
@@ -214,7 +214,7 @@ fn the_top_lines_keep_their_place() {
     }
 }
 
-/// A quantity has the same value everywhere, whichever message told it last.
+/// A quantity has the same value everywhere, whichever message carried it last.
 #[test]
 fn a_quantity_has_one_value_on_a_screen() {
     let mut rig = descending();

@@ -1,4 +1,4 @@
-//! What a crew types by mistake: it does nothing, and is told why.
+//! Keys typed by mistake: they do nothing, and the reason is shown.
 
 use ground::key::Key;
 use ground::model::Page;
@@ -9,7 +9,7 @@ use crate::rig::{MONO, Rig, is_abort, typed};
 use crate::screens::{armed, descending, on_the_pad};
 
 #[test]
-fn a_letter_of_another_keyboard_layout_is_told() {
+fn a_letter_of_another_keyboard_layout_is_reported() {
     for letter in ['Ф', 'А', 'ф', 'あ', 'ä'] {
         let mut rig = on_the_pad();
         rig.key(Key::Char(letter));
@@ -28,7 +28,7 @@ fn a_letter_of_another_keyboard_layout_is_told() {
 }
 
 #[test]
-fn an_enter_after_the_question_of_an_abort_has_run_out_is_told_that_nothing_was_sent() {
+fn an_enter_after_the_time_limit_of_an_abort_reports_that_nothing_was_sent() {
     let mut rig = descending();
     rig.key(Key::CtrlX);
     rig.run(2.3);
@@ -56,7 +56,7 @@ fn an_enter_after_the_question_of_an_abort_has_run_out_is_told_that_nothing_was_
 fn the_rest_of_a_refused_word_is_swallowed_until_enter() {
     for word in ["ARM", "CONFIRM"] {
         let mut rig = Rig::crewed();
-        rig.hears = false;
+        rig.uplink_alive = false;
         rig.run(4.0);
         rig.key(Key::Char('A'));
         rig.expect_event("cannot arm");
@@ -79,9 +79,9 @@ fn the_rest_of_a_refused_word_is_swallowed_until_enter() {
     assert_ne!(rig.model.page(), Page::Find);
 }
 
-/// A motor that was commanded to light may not have lit.
+/// A motor may not ignite on command.
 #[test]
-fn nothing_says_lift_off_before_the_vehicle_has_moved() {
+fn no_text_reports_a_lift_off_before_the_vehicle_has_moved() {
     let mut rig = armed();
     (rig.phase, rig.countdown_ms) = (TdPhase::TD_PHASE_BOOST, -600);
     rig.run(0.5);
@@ -111,7 +111,7 @@ fn nothing_says_lift_off_before_the_vehicle_has_moved() {
 
 /// The vehicle gives the gate up by itself.
 #[test]
-fn the_alarm_of_a_gate_that_stayed_shut_says_which_check_kept_it_shut() {
+fn the_alarm_of_an_inhibited_ignition_names_the_check() {
     let mut rig = descending();
     rig.text("ignition gate closed: tilt from vertical");
     rig.interlocks |= TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;

@@ -150,7 +150,7 @@ fn a_station_log_that_fails_in_the_countdown_holds_it() {
         let mut rig = armed();
         if nolog {
             rig.msg(Msg::Log(FAILED));
-            rig.msg(Msg::Asked { request: Request::WithoutLog, by: Seat::default() });
+            rig.msg(Msg::Requested { request: Request::WithoutLog, by: Seat::default() });
         }
         rig.countdown_ms = 8_000;
         rig.run(1.0);
@@ -167,7 +167,7 @@ fn a_station_log_that_fails_in_the_countdown_holds_it() {
 
 /// `--log none` is a choice that was made already.
 #[test]
-fn a_station_that_was_told_to_keep_no_log_may_arm() {
+fn a_station_started_without_a_log_may_arm() {
     let mut rig = Rig::new(Settings { log_path: None, ..settings(false, true) });
     rig.run(1.0);
     assert_eq!(rig.model.station_log(rig.now), LogStanding::None);

@@ -49,7 +49,7 @@ fn every_page_of_the_flight_shows_phase_fins_and_gimbal_as_numbers() {
         // Centidegrees that differ in every phase: commanded ones, and smaller measured ones.
         let commanded: [i16; 4] = [0, 1_000 + step, 9_000 - step, 4_500];
         let measured = [30, 850 + step, 8_800 - step, 4_450];
-        rig.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+        rig.receive(&MavMessage::TD_FINS(TD_FINS_DATA {
             boot_number: rig.boot_number,
             time_boot_ms: rig.boot_ms(),
             commanded,

@@ -36,7 +36,7 @@ fn station_of(number: u8, mission: Option<&str>) -> Rig {
         [(ANN, TdRole::TD_ROLE_RANGE_SAFETY, "Ann"), (BOB, TdRole::TD_ROLE_FLIGHT, "Bob")]
     {
         let name = characters::<16>(name).into();
-        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { boot_number: 0, number, role, name }));
+        rig.receive(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA { boot_number: 0, number, role, name }));
     }
     crew(&mut rig, TD_CREW_DATA::default());
     rig
@@ -44,10 +44,10 @@ fn station_of(number: u8, mission: Option<&str>) -> Rig {
 
 fn crew(rig: &mut Rig, mut crew: TD_CREW_DATA) {
     (crew.people, crew.time_boot_ms) = (2, rig.boot_ms());
-    rig.hear(&MavMessage::TD_CREW(crew));
+    rig.receive(&MavMessage::TD_CREW(crew));
 }
 
-fn asks(rig: &mut Rig, by: u8, act: TdAct, ask_left_ms: u16) {
+fn proposes(rig: &mut Rig, by: u8, act: TdAct, ask_left_ms: u16) {
     crew(rig, TD_CREW_DATA { ask_number: 4_711, ask_left_ms, act, asked_by: by, ..TD_CREW_DATA::default() });
 }
 
@@ -83,22 +83,22 @@ fn the_header_names_operator_role_and_mode_on_every_page() {
     }
     let mut rig = station_of(ANN, None);
     crew(&mut rig, TD_CREW_DATA::default());
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 1, ..TD_CREW_DATA::default() }));
+    rig.receive(&MavMessage::TD_CREW(TD_CREW_DATA { people: 1, ..TD_CREW_DATA::default() }));
     rig.expect_screen("RANGE SAFETY Ann one-person");
 }
 
 #[test]
-fn the_other_s_ask_is_on_this_screen_and_confirmed_by_its_number() {
+fn the_other_s_proposal_is_on_this_screen_and_confirmed_by_its_number() {
     let mut rig = station_of(ANN, None);
-    asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
+    proposes(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("FLIGHT Bob asks to arm."), "{screen}");
+    assert!(screen.contains("FLIGHT Bob requests to arm."), "{screen}");
     assert!(screen.contains("Press A within 9 s, then type CONFIRM and Enter to confirm."), "{screen}");
     rig.take_commands();
     // The word of an ask confirms nothing.
     rig.keys(&enter("AARM"));
     assert_eq!(rig.take_commands(), []);
-    asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 7_000);
+    proposes(&mut rig, BOB, TdAct::TD_ACT_ARM, 7_000);
     rig.keys(&confirm());
     let sent = rig.take_commands();
     let [command] = &sent[..] else { panic!("{sent:?}") };
@@ -110,16 +110,16 @@ fn the_other_s_ask_is_on_this_screen_and_confirmed_by_its_number() {
 }
 
 #[test]
-fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
+fn a_lapsed_or_changed_proposal_is_not_confirmed() {
     let mut rig = station_of(ANN, None);
-    asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 2_000);
+    proposes(&mut rig, BOB, TdAct::TD_ACT_ARM, 2_000);
     rig.key(Key::Char('A'));
     rig.run(2.5);
     rig.keys(&enter("CONFIRM"));
     assert_eq!(rig.take_commands(), []);
-    asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
+    proposes(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_000);
     rig.keys(&typed("ACONFIRM"));
-    // Bob has taken it back and asks anew: the ask that was on the screen is no longer the one that
+    // Bob has withdrawn it and proposes again: the proposal on the screen is no longer the one that
     // waits.
     crew(
         &mut rig,
@@ -133,26 +133,26 @@ fn an_ask_that_has_lapsed_or_changed_is_not_confirmed() {
     );
     rig.key(Key::Enter);
     assert_eq!(rig.take_commands(), []);
-    rig.expect_event("nothing is confirmed: it is no longer asked");
+    rig.expect_event("nothing is confirmed: the request has lapsed");
 }
 
 #[test]
-fn an_own_ask_says_who_must_confirm_and_is_no_refusal() {
+fn a_local_proposal_names_who_must_confirm_and_is_no_refusal() {
     let mut rig = station_of(BOB, None);
     rig.key(Key::Char('A'));
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("This only asks: RANGE SAFETY or PAD must confirm within 10 s."), "{screen}");
+    assert!(screen.contains("This is a request: RANGE SAFETY or PAD must confirm within 10 s."), "{screen}");
     rig.keys(&enter("ARM"));
     let sent = rig.take_commands();
     assert!(matches!(&sent[..], [command] if is_arm(command) && command.param3.to_bits() == 0), "{sent:?}");
     let rejected = MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
     rig.answer_with(GROUND, MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, rejected, 4_711);
-    asks(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_500);
+    proposes(&mut rig, BOB, TdAct::TD_ACT_ARM, 9_500);
     let screen = rig.screen(80, 24);
-    assert!(screen.contains("You ask to arm."), "{screen}");
-    assert!(screen.contains("acknowledged asked"), "{screen}");
+    assert!(screen.contains("You request to arm."), "{screen}");
+    assert!(screen.contains("acknowledged requested"), "{screen}");
     assert!(!screen.contains("REFUSED"), "{screen}");
-    // Nobody confirms their own ask here, either.
+    // No operator confirms their own proposal here, either.
     rig.keys(&confirm());
     assert!(rig.take_commands().iter().all(|command| command.param3.to_bits() == 0));
 }
@@ -176,7 +176,7 @@ fn only_the_one_who_confirmed_taps_and_a_held_key_taps_once() {
 }
 
 #[test]
-fn anyone_holds_and_the_screen_says_who_held_and_why() {
+fn anyone_holds_and_the_screen_shows_who_held_and_why() {
     let mut rig = counting(BOB);
     rig.take_commands();
     rig.keys(&[Key::Char('H'), Key::Enter]);
@@ -187,8 +187,8 @@ fn anyone_holds_and_the_screen_says_who_held_and_why() {
     );
     rig.countdown_ms = i32::MAX;
     for (hold, held_by, words) in [
-        (TdHold::TD_HOLD_COMMANDED, ANN, "HOLD: RANGE SAFETY Ann asked for it; start anew"),
-        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 1 s; start anew"),
+        (TdHold::TD_HOLD_COMMANDED, ANN, "HOLD: RANGE SAFETY Ann requested it; start again"),
+        (TdHold::TD_HOLD_TAP_OVERDUE, BOB, "HOLD: no tap of FLIGHT Bob for 1 s; start again"),
     ] {
         rig.hold = hold;
         crew(&mut rig, TD_CREW_DATA { held_by, commanded_by: BOB, ..TD_CREW_DATA::default() });
@@ -199,7 +199,7 @@ fn anyone_holds_and_the_screen_says_who_held_and_why() {
 }
 
 #[test]
-fn an_observer_arms_nothing_and_is_told_why() {
+fn an_observer_arms_nothing_and_reads_the_reason() {
     let mut rig = station_of(0, None);
     rig.keys(&enter("AARM"));
     assert_eq!(rig.take_commands(), []);
@@ -207,7 +207,7 @@ fn an_observer_arms_nothing_and_is_told_why() {
 }
 
 #[test]
-fn command_is_taken_with_a_ladder_of_its_own() {
+fn command_is_taken_with_a_separate_ladder() {
     let mut rig = counting(BOB);
     let other = Address { system_id: 254, component_id: 190 };
     rig.armed = false;
@@ -236,7 +236,7 @@ fn another_mission_is_not_armed_and_both_hashes_are_named() {
     let fly = |rig: &mut Rig, text: &str| {
         let name = characters::<20>("mk2").into();
         let (hash, start) = (MissionHash::of(text).0, TdStart::TD_START_APOGEE);
-        rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA {
+        rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA {
             hash,
             name,
             start,

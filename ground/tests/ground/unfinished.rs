@@ -16,9 +16,9 @@ use crate::screens::counting;
 const ABORT: MavCmd = MavCmd::MAV_CMD_DO_FLIGHTTERMINATION;
 
 /// What was kept last.
-fn kept(rig: &Rig) -> Option<Unfinished> {
+fn stored(rig: &Rig) -> Option<Unfinished> {
     rig.actions.iter().rev().find_map(|action| match action {
-        Action::KeepUnfinished(kept) => Some(kept.clone()),
+        Action::StoreUnfinished(stored) => Some(stored.clone()),
         _ => None,
     })
 }
@@ -32,43 +32,43 @@ fn latched(rig: &mut Rig) {
 }
 
 #[test]
-fn an_abort_and_its_wait_are_kept_until_it_is_confirmed_and_people_may_approach() {
+fn an_abort_and_its_wait_are_stored_until_it_is_confirmed_and_people_may_approach() {
     let mut rig = counting();
-    assert_eq!(kept(&rig), None, "nothing is unfinished");
+    assert_eq!(stored(&rig), None, "nothing is unfinished");
     rig.abort();
     rig.run(0.2);
-    let asked = kept(&rig).and_then(|kept| kept.abort).expect("it is not confirmed");
-    assert!(asked.contains("UTC"), "{asked}");
+    let abort = stored(&rig).and_then(|stored| stored.abort).expect("it is not confirmed");
+    assert!(abort.contains("UTC"), "{abort}");
     rig.answer(ABORT, 0);
     latched(&mut rig);
-    assert_eq!(kept(&rig), Some(Unfinished { abort: None, danger: Some(Danger::Live) }));
+    assert_eq!(stored(&rig), Some(Unfinished { abort: None, danger: Some(Danger::Live) }));
     rig.actions.clear();
     for _ in 0..10 {
         rig.approach_wait_s -= 1;
         rig.run(1.0);
     }
-    assert_eq!(kept(&rig), None, "a time that passes is not stored");
+    assert_eq!(stored(&rig), None, "a time that passes is not stored");
     rig.approach_wait_s = 0;
     rig.run(0.2);
-    assert_eq!(kept(&rig).and_then(|kept| kept.danger), Some(Danger::LiveWaited));
+    assert_eq!(stored(&rig).and_then(|stored| stored.danger), Some(Danger::LiveWaited));
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(0.2);
-    assert_eq!(kept(&rig), Some(Unfinished::default()));
+    assert_eq!(stored(&rig), Some(Unfinished::default()));
 }
 
 #[test]
-fn an_abort_that_was_refused_for_good_is_not_kept() {
+fn a_permanently_refused_abort_is_not_stored() {
     let mut rig = counting();
     rig.abort();
     rig.run(0.2);
-    assert!(kept(&rig).is_some_and(|kept| kept.abort.is_some()));
+    assert!(stored(&rig).is_some_and(|stored| stored.abort.is_some()));
     rig.answer(ABORT, 4);
     rig.run(0.2);
-    assert_eq!(kept(&rig), Some(Unfinished::default()));
+    assert_eq!(stored(&rig), Some(Unfinished::default()));
 }
 
 #[test]
-fn a_demonstration_and_an_attached_screen_keep_nothing() {
+fn a_demonstration_and_an_attached_screen_store_nothing() {
     for change in [
         |settings: &mut Settings| settings.demonstration = true,
         |settings: &mut Settings| settings.role = Role::Attached,
@@ -77,14 +77,14 @@ fn a_demonstration_and_an_attached_screen_keep_nothing() {
         change(&mut settings);
         let mut rig = Rig::new(settings);
         latched(&mut rig);
-        assert_eq!(kept(&rig), None);
+        assert_eq!(stored(&rig), None);
     }
 }
 
 /// The station was quit during the wait, or after it, and vehicle and station were switched on
 /// again.
 #[test]
-fn a_restarted_station_waits_again_in_full_and_then_asks_for_the_pin() {
+fn a_restarted_station_waits_again_in_full_and_then_requests_the_pin() {
     for danger in [Danger::Live, Danger::LiveWaited, Danger::NotReported] {
         let mut rig = Rig::new(settings(false, true));
         rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, danger: Some(danger) })));
@@ -102,18 +102,18 @@ fn a_restarted_station_waits_again_in_full_and_then_asks_for_the_pin() {
     let live = " one person: pin in: the motor is LIVE, and the waiting time is over";
     assert_eq!(reason(&rig).as_deref(), Some(live));
     // It is kept for the next start, too.
-    assert_eq!(kept(&rig).and_then(|kept| kept.danger), Some(Danger::LiveWaited));
+    assert_eq!(stored(&rig).and_then(|stored| stored.danger), Some(Danger::LiveWaited));
     rig.motor = TdMotor::TD_MOTOR_PIN_IN;
     rig.run(1.0);
     rig.motor = TdMotor::TD_MOTOR_LIVE;
     rig.run(1.0);
     assert_eq!(reason(&rig), None);
-    assert_eq!(kept(&rig), Some(Unfinished::default()));
+    assert_eq!(stored(&rig), Some(Unfinished::default()));
 }
 
 /// A motor that was burnt out is no live one.
 #[test]
-fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
+fn after_the_wait_for_a_hot_motor_no_pin_is_requested() {
     let mut rig = Rig::new(settings(false, true));
     rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: None, danger: Some(Danger::Hot) })));
     rig.run(2.0);
@@ -123,14 +123,14 @@ fn after_the_wait_for_a_hot_motor_nobody_is_asked_to_put_a_pin_in() {
 }
 
 #[test]
-fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
+fn a_new_station_reports_the_unconfirmed_abort() {
     let mut rig = Rig::new(settings(false, true));
-    let asked = Some("12:03:05 UTC (screen 2, Ann)".to_owned());
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked.clone(), danger: None })));
+    let abort = Some("12:03:05 UTC (screen 2, Ann)".to_owned());
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: abort.clone(), danger: None })));
     rig.run(1.0);
-    let words = "ABORT asked at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
+    let words = "ABORT requested at 12:03:05 UTC (screen 2, Ann) NOT CONFIRMED";
     assert!(rig.screen(120, 36).contains(words), "{}", rig.screen(120, 36));
-    rig.expect_event("an ABORT was asked for at 12:03:05 UTC (screen 2, Ann)");
+    rig.expect_event("an ABORT was requested at 12:03:05 UTC (screen 2, Ann)");
     assert!(rig.take_commands().is_empty(), "nothing is sent by itself");
     // It ends when somebody has seen it, or with another abort.
     rig.key(Key::Char(' '));
@@ -138,8 +138,8 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
     let is_open =
         |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.what.kind == AlarmKind::AbortBefore);
     assert!(!is_open(&rig));
-    assert_eq!(kept(&rig), Some(Unfinished::default()));
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: asked, danger: None })));
+    assert_eq!(stored(&rig), Some(Unfinished::default()));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: abort, danger: None })));
     rig.run(0.1);
     assert!(is_open(&rig));
     rig.abort();
@@ -150,7 +150,7 @@ fn a_new_station_says_what_was_asked_for_and_not_confirmed() {
 
 /// Whoever ends the station takes the words away.
 #[test]
-fn quitting_takes_the_word_while_people_must_keep_away() {
+fn quitting_takes_the_word_while_people_must_stay_away() {
     for key in ['q', 'Q'] {
         let mut rig = counting();
         latched(&mut rig);
@@ -167,7 +167,7 @@ fn quitting_takes_the_word_while_people_must_keep_away() {
     latched(&mut rig);
     rig.key(Key::Char('q'));
     rig.run(0.2);
-    assert!(rig.wants_to_quit(), "nobody stands near the vehicle of a demonstration");
+    assert!(rig.wants_to_quit(), "a demonstration has no people near its vehicle");
 }
 
 /// An attached screen whose station hangs.
@@ -187,11 +187,11 @@ fn hangs(rig: &mut Rig, seconds: u64) {
 }
 
 /// What the run loop notes when the station's socket has taken the request.
-fn asks(rig: &mut Rig) {
+fn requests(rig: &mut Rig) {
     rig.actions.clear();
     rig.abort();
     assert!(rig.actions.contains(&Action::Request(Request::Command(CommandKind::Abort))));
-    rig.model.link.abort_asked_at = Some(rig.now);
+    rig.model.link.abort_requested_at = Some(rig.now);
 }
 
 #[test]
@@ -199,17 +199,17 @@ fn an_abort_that_a_hung_station_has_not_sent_is_the_largest_word_of_every_page()
     let mut before = hung();
     hangs(&mut before, 3);
     before.expect_screen("abort now: NOT SENT while the station hangs");
-    asks(&mut before);
-    // It may be asked for before the silence is long enough to be one.
+    requests(&mut before);
+    // It may be requested before the silence counts as one.
     let mut after = hung();
-    asks(&mut after);
-    after.expect_screen("ABORT asked, not yet taken by the station");
+    requests(&mut after);
+    after.expect_screen("ABORT requested, not yet accepted by the station");
     hangs(&mut after, 3);
     for mut rig in [before, after] {
         for digit in "123456789".chars() {
             rig.key(Key::Char(digit));
             let screen = rig.screen(80, 24);
-            let words = " ABORT NOT SENT: the station hangs; it sends it when it goes on";
+            let words = " ABORT NOT SENT: the station hangs; it sends it when it resumes";
             assert!(screen.lines().nth(2).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
             assert!(screen.lines().nth(3).is_some_and(|row| row.contains(words)), "{digit}: {screen}");
             assert!(screen.lines().nth(4).is_some_and(|row| row.contains('▀')), "{digit} large: {screen}");

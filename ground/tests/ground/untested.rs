@@ -9,8 +9,8 @@ use protocol::log::record::Record;
 use crate::rig::{Rig, enter, is_arm, settings};
 use crate::screens::on_the_pad;
 
-fn tell_mission(rig: &mut Rig, motor_burns: u8) {
-    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { motor_burns, ..TD_MISSION_DATA::default() }));
+fn report_mission(rig: &mut Rig, motor_burns: u8) {
+    rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { motor_burns, ..TD_MISSION_DATA::default() }));
 }
 
 /// On the pad, with everything well but for the motor.
@@ -18,7 +18,7 @@ fn real(motor_burns: u8) -> Rig {
     let mut rig = on_the_pad();
     rig.simulated = false;
     rig.run(1.0);
-    tell_mission(&mut rig, motor_burns);
+    report_mission(&mut rig, motor_burns);
     rig.actions.clear();
     rig
 }
@@ -56,19 +56,19 @@ fn an_unconfirmed_motor_of_a_real_vehicle_is_armed_by_a_word_that_is_recorded() 
 #[test]
 fn a_confirmed_or_a_simulated_motor_needs_no_word() {
     let mut simulated = on_the_pad();
-    tell_mission(&mut simulated, 0);
-    for (mut rig, told) in [
+    report_mission(&mut simulated, 0);
+    for (mut rig, events) in [
         (real(4), "motor       confirmed, burns of its lot: 4"),
         (simulated, "motor       certified, no burn of its lot"),
     ] {
         rig.expect_screen("every arming check passes");
-        assert!(rig.screen(120, 40).contains(told), "{}", rig.screen(120, 40));
+        assert!(rig.screen(120, 40).contains(events), "{}", rig.screen(120, 40));
         rig.keys(&enter("AARM"));
-        assert!(rig.take_commands().iter().any(is_arm), "{told}");
+        assert!(rig.take_commands().iter().any(is_arm), "{events}");
     }
 }
 
-/// A real vehicle that has not told its mission has not said that burns confirm it; and another
+/// A real vehicle without a reported mission has not reported that burns confirm it; and another
 /// power-up is another motor.
 #[test]
 fn the_word_counts_for_one_power_up_only() {
@@ -76,19 +76,19 @@ fn the_word_counts_for_one_power_up_only() {
     rig.simulated = false;
     rig.run(1.0);
     rig.expect_screen("NO-GO: motor not known");
-    tell_mission(&mut rig, 0);
+    report_mission(&mut rig, 0);
     rig.keys(&enter("AUNTESTED"));
     assert_eq!(why_untested(&rig.model), None);
     rig.reboot();
     rig.run(15.0);
-    tell_mission(&mut rig, 0);
+    report_mission(&mut rig, 0);
     assert!(why_untested(&rig.model).is_some());
 }
 
 /// An attached screen asks its station to go on with an untested motor, or without a log. The
-/// station decides, and records who asked.
+/// station decides, and records who requested it.
 #[test]
-fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
+fn an_attached_screen_requests_the_overruling_from_its_station() {
     let failed = LogHealth { failed: true, ..LogHealth::default() };
     for (simulated, health, word, request) in [
         (false, LogHealth::default(), "AUNTESTED", Request::Untested),
@@ -98,13 +98,13 @@ fn an_attached_screen_asks_its_station_to_go_on_nevertheless() {
         rig.model.alarms.history_ends();
         rig.simulated = simulated;
         rig.run(1.0);
-        tell_mission(&mut rig, 0);
+        report_mission(&mut rig, 0);
         rig.msg(Msg::Log(health));
         let stops = |rig: &Rig| why_untested(&rig.model).or_else(|| rig.model.why_no_log(rig.now));
         rig.keys(&enter(word));
         assert!(rig.actions.contains(&Action::Request(request.clone())));
         assert_ne!(stops(&rig), None, "the station decides");
-        rig.msg(Msg::Asked { request, by: Seat::new(2, "bob on pts/2") });
+        rig.msg(Msg::Requested { request, by: Seat::new(2, "bob on pts/2") });
         assert_eq!(stops(&rig), None);
         rig.expect_event("(screen 2, bob on pts/2)");
     }

@@ -1,4 +1,4 @@
-//! The uplink: whether the vehicle hears this station.
+//! The uplink: whether the vehicle receives this station.
 
 use ground::key::Key;
 use ground::model::{AlarmKind, LinkState, Prompt, Seat};
@@ -15,14 +15,14 @@ fn directions(rig: &Rig) -> String {
     top_lines::link(&rig.model, MONO, rig.now).to_string()
 }
 
-/// Only the uplink is cut; the vehicle is still heard.
+/// Only the uplink is cut; telemetry still arrives.
 #[test]
 fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     let mut rig = Rig::crewed();
     rig.run(2.0);
     assert_eq!(directions(&rig), "down 0s up 0s ");
     rig.expect_screen(" every arming check passes");
-    rig.hears = false;
+    rig.uplink_alive = false;
     rig.run(2.4);
     assert_eq!(directions(&rig), "down 0s up late 2s ");
     let ready = top_lines::readiness(&rig.model, rig.now).unwrap().0;
@@ -31,13 +31,13 @@ fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     let screen = rig.screen(80, 24);
     assert_eq!(directions(&rig), "down 0s UP LOST 4s ");
     assert!(screen.contains("ALARM UPLINK LOST") && screen.contains("NO-GO: uplink not proven"), "{screen}");
-    assert!(screen.contains("▶ it hears us"), "{screen}");
+    assert!(screen.contains("▶ uplink proven"), "{screen}");
     rig.keys(&ladder());
     assert!(rig.take_commands().is_empty(), "no offer to arm, and so nothing is sent");
     rig.expect_event("cannot arm: the uplink is not proven");
-    rig.hears = true;
+    rig.uplink_alive = true;
     rig.run(1.0);
-    rig.expect_screen("✓ it hears us");
+    rig.expect_screen("✓ uplink proven");
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
 }
@@ -48,7 +48,7 @@ fn a_lost_uplink_prevents_arming_in_the_middle_of_the_ladder() {
     let mut rig = Rig::crewed();
     rig.key(Key::Char('A'));
     assert!(rig.model.dialog.as_ref().is_some_and(|dialog| dialog.prompt == Prompt::Arm));
-    rig.hears = false;
+    rig.uplink_alive = false;
     rig.run(4.0);
     rig.keys(&ladder()[1..]);
     assert!(rig.take_commands().is_empty());
@@ -56,12 +56,12 @@ fn a_lost_uplink_prevents_arming_in_the_middle_of_the_ladder() {
 
 /// If only the vehicle has a key, it accepts nothing and reports that to every station.
 #[test]
-fn a_vehicle_that_accepts_nothing_says_why() {
+fn a_vehicle_that_accepts_nothing_reports_why() {
     let mut rig = Rig::crewed();
-    rig.hears = false;
+    rig.uplink_alive = false;
     for _ in 0..10 {
         rig.run(0.4);
-        rig.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+        rig.receive(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
             accepted_age_ms: u16::MAX,
             refused_age_ms: 100,
             refused_count: 7,
@@ -71,11 +71,11 @@ fn a_vehicle_that_accepts_nothing_says_why() {
             ..TD_UPLINK_DATA::default()
         }));
     }
-    assert_eq!(rig.model.link.uplink.state(rig.now), LinkState::NeverHeard);
+    assert_eq!(rig.model.link.uplink.state(rig.now), LinkState::NeverReceived);
     let alarm = rig.model.alarms.foremost().map(|alarm| &alarm.what).unwrap();
     let why = "it refuses frames of 255/190: not signed, is the key missing here?";
     assert_eq!(alarm.kind, AlarmKind::UplinkLost);
-    assert_eq!(alarm.text, format!("UPLINK LOST: the vehicle does not hear this station; {why}"));
+    assert_eq!(alarm.text, format!("UPLINK LOST: the vehicle does not receive this station; {why}"));
     rig.key(Key::Char('5'));
     assert!(rig.screen(140, 45).contains("refused  7 of 255/190 by the vehicle"), "{}", rig.screen(140, 45));
 }
@@ -88,7 +88,7 @@ fn an_answer_proves_the_uplink_of_a_vehicle_that_does_not_report_it() {
     assert!(!rig.model.link.uplink.is_proven(rig.now));
     let ts1 = i64::try_from(rig.now.as_nanos()).unwrap();
     rig.now += std::time::Duration::from_millis(80);
-    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
+    rig.receive(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
     assert!(rig.model.link.uplink.is_proven(rig.now));
 }
 

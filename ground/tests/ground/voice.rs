@@ -17,12 +17,12 @@ fn rig(amount: Amount, has_voice: bool) -> Rig {
     rig
 }
 
-fn said(rig: &mut Rig) -> Vec<String> {
-    let said = std::mem::take(&mut rig.actions).into_iter().filter_map(|action| match action {
-        Action::Say(text) => Some(text),
+fn called_out(rig: &mut Rig) -> Vec<String> {
+    let called_out = std::mem::take(&mut rig.actions).into_iter().filter_map(|action| match action {
+        Action::CallOut(text) => Some(text),
         _ => None,
     });
-    said.collect()
+    called_out.collect()
 }
 
 /// Up to 120 m and down again to the ground, then the verdict.
@@ -58,7 +58,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
     let mut rig = rig(Amount::Normal, true);
     fly(&mut rig);
     let expected = [
-        "commanded to light",
+        "ignition commanded",
         "liftoff",
         "50 metres",
         "100 metres",
@@ -72,7 +72,7 @@ fn a_flight_is_called_out_from_liftoff_to_verdict() {
         "do not approach",
         "stands undamaged",
     ];
-    assert_eq!(said(&mut rig), expected);
+    assert_eq!(called_out(&mut rig), expected);
 }
 
 #[test]
@@ -80,31 +80,31 @@ fn more_or_less_is_called_out_as_the_crew_wants() {
     let mut few = rig(Amount::Few, true);
     fly(&mut few);
     assert_eq!(
-        said(&mut few),
+        called_out(&mut few),
         ["liftoff", "apogee", "ignition", "touchdown", "do not approach", "stands undamaged"]
     );
     let mut all = rig(Amount::All, true);
     fly(&mut all);
-    let all = said(&mut all);
+    let all = called_out(&mut all);
     assert!(
         ["40 metres", "30 metres", "20 metres", "10 metres"]
             .iter()
-            .all(|text| all.iter().any(|said| said == text)),
+            .all(|text| all.iter().any(|called_out| called_out == text)),
         "{all:?}"
     );
     let mut nothing = rig(Amount::Nothing, true);
     fly(&mut nothing);
-    assert!(said(&mut nothing).is_empty());
+    assert!(called_out(&mut nothing).is_empty());
 }
 
 #[test]
-fn heights_keep_their_distance_in_time() {
+fn heights_are_called_out_with_a_minimum_interval() {
     let mut settings = settings(false, true);
     settings.talk = Talk { amount: Amount::All, has_voice: true, height_every: Duration::from_secs(3) };
     let mut rig = Rig::new(settings);
     rig.run(1.0);
     fly(&mut rig);
-    let heights = said(&mut rig).iter().filter(|text| text.ends_with("metres")).count();
+    let heights = called_out(&mut rig).iter().filter(|text| text.ends_with("metres")).count();
     assert!((3..=5).contains(&heights), "{heights} in 12 s");
 }
 
@@ -113,13 +113,13 @@ fn no_go_and_a_lost_link_are_called_out_once() {
     let mut rig = rig(Amount::Few, true);
     rig.checks_failed = TdCheck::TD_CHECK_IGNITER.bits();
     rig.run(2.0);
-    assert_eq!(said(&mut rig), ["no go: igniter"]);
+    assert_eq!(called_out(&mut rig), ["no go: igniter"]);
     rig.checks_failed = 0;
     rig.run(2.0);
     rig.speaks = false;
     rig.run(8.0);
-    let said = said(&mut rig);
-    assert_eq!(said.iter().filter(|text| *text == "link lost").count(), 1, "{said:?}");
+    let called_out = called_out(&mut rig);
+    assert_eq!(called_out.iter().filter(|text| *text == "link lost").count(), 1, "{called_out:?}");
 }
 
 /// Without a voice bells can be counted: one a tick, and more of them for what is worse.
@@ -127,7 +127,7 @@ fn no_go_and_a_lost_link_are_called_out_once() {
 fn without_a_voice_bells_differ() {
     let bells = |rig: &mut Rig| {
         let actions = std::mem::take(&mut rig.actions);
-        assert!(!actions.iter().any(|action| matches!(action, Action::Say(_))));
+        assert!(!actions.iter().any(|action| matches!(action, Action::CallOut(_))));
         actions.iter().filter(|action| **action == Action::Bell).count()
     };
     let mut rig = rig(Amount::Normal, false);
@@ -156,8 +156,8 @@ fn the_past_is_not_called_out() {
     rig.phase = TdPhase::TD_PHASE_BOOST;
     rig.run(1.0);
     rig.model.alarms.history_ends();
-    assert!(said(&mut rig).is_empty());
+    assert!(called_out(&mut rig).is_empty());
     rig.phase = TdPhase::TD_PHASE_COAST;
     rig.run(1.0);
-    assert_eq!(said(&mut rig), ["coast"]);
+    assert_eq!(called_out(&mut rig), ["coast"]);
 }

@@ -40,7 +40,7 @@ fn first_line(rig: &Rig, columns: u16, rows: u16) -> String {
 pub(crate) fn beside(rig: &mut Rig, boot_number: u32, seconds: u32) {
     for _ in 0..10 * seconds {
         rig.run(0.1);
-        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        rig.receive(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
             boot_number,
             time_boot_ms: 900_000 + rig.boot_ms(),
             phase: TdPhase::TD_PHASE_PAD_IDLE,
@@ -52,7 +52,7 @@ pub(crate) fn beside(rig: &mut Rig, boot_number: u32, seconds: u32) {
 }
 
 #[test]
-fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
+fn two_vehicles_under_one_id_are_named_in_the_first_line_and_nothing_moves() {
     let mut rig = Rig::crewed();
     beside(&mut rig, 9, 2);
     for page in "123456789?".chars() {
@@ -75,13 +75,13 @@ fn two_vehicles_under_one_id_are_said_in_the_first_line_and_nothing_moves() {
     let sent = rig.take_commands();
     assert!(!sent.iter().any(moves), "{sent:?}");
     assert!(sent.iter().any(is_abort));
-    // One has answered and shows the latch: the other one may not have heard it.
+    // One has answered and shows the latch: the other one may not have received it.
     rig.answer(MavCmd::MAV_CMD_DO_FLIGHTTERMINATION, 0);
     rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED;
     beside(&mut rig, 9, 5);
     assert!(rig.take_commands().iter().filter(|sent| is_abort(sent)).count() > 20);
     rig.expect_event("cannot arm: TWO VEHICLES under id 1: switch one off");
-    rig.expect_event("the ABORT goes to every vehicle that is heard under id 1");
+    rig.expect_event("the ABORT goes to every vehicle received under id 1");
 }
 
 /// The crew switches the second vehicle off, whichever is shown.
@@ -114,13 +114,13 @@ fn the_first_words_of_a_spare_on_one_channel_are_never_those_of_the_shown_vehicl
     let mut rig = Rig::crewed();
     for _ in 0..2 {
         let clock_ms = rig.boot_ms();
-        rig.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        rig.receive(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: TdPhase::TD_PHASE_POWERED as u32 | 9 << PHASE_BITS,
             mavtype: MavType::MAV_TYPE_ROCKET,
             autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
             ..HEARTBEAT_DATA::default()
         }));
-        rig.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+        rig.receive(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
             boot_number: 9,
             time_boot_ms: clock_ms,
             pitch_measured: 1_234,
@@ -129,7 +129,7 @@ fn the_first_words_of_a_spare_on_one_channel_are_never_those_of_the_shown_vehicl
         assert_eq!(rig.model.vehicle.phase_now(), Some(TdPhase::TD_PHASE_PAD_IDLE));
         let gimbal = rig.model.vehicle.last::<TD_GIMBAL_DATA>();
         assert!(gimbal.is_none_or(|gimbal| gimbal.value.pitch_measured != 1_234));
-        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        rig.receive(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
             boot_number: 9,
             vehicle_uid: 5,
             time_boot_ms: clock_ms,
@@ -143,7 +143,7 @@ fn the_first_words_of_a_spare_on_one_channel_are_never_those_of_the_shown_vehicl
 fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_it() {
     let mut rig = counting();
     for step in 0..60 {
-        rig.hear(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
+        rig.receive(&MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA {
             boot_number: 9,
             vehicle_uid: 5,
             time_boot_ms: 100 * step,
@@ -168,15 +168,15 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
 
 /// It begins with what a station should know first: its mission, its limits.
 #[test]
-fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
+fn messages_of_a_spare_before_its_first_status_are_not_shown_as_the_vehicles() {
     let mut rig = counting();
-    rig.msg(Msg::HeardFrom(1));
+    rig.msg(Msg::ReceivedFrom(1));
     rig.run(1.0);
-    rig.msg(Msg::HeardFrom(2));
-    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
+    rig.msg(Msg::ReceivedFrom(2));
+    rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission(), None);
-    rig.msg(Msg::HeardFrom(1));
-    rig.hear(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
+    rig.msg(Msg::ReceivedFrom(1));
+    rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission().as_ref().map(|mission| mission.hash.0), Some([8; 8]));
 }
 
@@ -184,8 +184,8 @@ fn what_a_spare_says_before_its_first_status_is_not_shown_as_the_vehicle_s() {
 fn one_of_two_vehicles_is_chosen_by_name_and_then_armed() {
     let mut rig = Rig::crewed();
     beside(&mut rig, 9, 1);
-    // Nobody is heard with that one.
-    rig.msg(Msg::Asked { request: Request::Choose(8), by: Seat::default() });
+    // No vehicle with that one is received.
+    rig.msg(Msg::Requested { request: Request::Choose(8), by: Seat::default() });
     beside(&mut rig, 9, 1);
     assert!(![Some(8), Some(9)].contains(&rig.model.vehicle.boot.number()));
     assert!(ground::model::why_nothing_moves(&rig.model, rig.now).is_some());
@@ -335,7 +335,7 @@ fn what_can_move_something_names_the_boot_and_what_stops_does_not() {
 
 /// A report of the vehicle about a station with our address.
 fn report(rig: &mut Rig, session: u32, same_id: u8, commands: bool, accepted_age_ms: u16) {
-    rig.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+    rig.receive(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
         accepted_age_ms,
         refused_age_ms: u16::MAX,
         target_system: GROUND.system_id,
@@ -348,9 +348,9 @@ fn report(rig: &mut Rig, session: u32, same_id: u8, commands: bool, accepted_age
 }
 
 #[test]
-fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_is_gone() {
+fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_ends() {
     let frame = |rig: &mut Rig| {
-        rig.hear_from(
+        rig.receive_from(
             GROUND,
             &MavMessage::HEARTBEAT(HEARTBEAT_DATA { custom_mode: 5, ..HEARTBEAT_DATA::default() }),
         );
@@ -374,7 +374,7 @@ fn another_station_under_our_id_is_an_alarm_and_nothing_is_armed_until_it_is_gon
     }
 }
 
-/// Started again with the same ids: the vehicle tells of the station before for 5 s.
+/// Started again with the same ids: the vehicle reports the station before for 5 s.
 #[test]
 fn a_station_that_is_started_again_does_not_take_its_past_for_another_station() {
     let mut rig = Rig::crewed();
@@ -391,10 +391,10 @@ fn a_station_that_is_started_again_does_not_take_its_past_for_another_station() 
 }
 
 #[test]
-fn an_echo_of_our_own_frames_and_a_station_that_has_long_been_silent_are_no_other_station() {
+fn an_echo_of_our_frames_and_a_long_silent_station_are_no_other_station() {
     let mut rig = Rig::crewed();
     let echo = HEARTBEAT_DATA { custom_mode: SESSION, ..HEARTBEAT_DATA::default() };
-    rig.hear_from(GROUND, &MavMessage::HEARTBEAT(echo));
+    rig.receive_from(GROUND, &MavMessage::HEARTBEAT(echo));
     report(&mut rig, 5, 0, false, 5_100);
     rig.run(0.1);
     rig.keys(&ladder());
@@ -461,7 +461,7 @@ fn an_arming_a_start_and_an_abort_by_another_station_are_alarms_with_its_address
 }
 
 #[test]
-fn the_heartbeat_tells_the_session_of_the_station() {
+fn the_heartbeat_carries_the_session_of_the_station() {
     let mut rig = Rig::crewed();
     let beat = rig.actions.iter().find_map(|action| match action {
         Action::Send(message) => match &**message {
@@ -487,19 +487,19 @@ fn station_of(number: u8, name: &str, role: Role, operator: &str) -> Rig {
     {
         let mut bytes = [0; 16];
         bytes[..3].copy_from_slice(name.as_bytes());
-        rig.hear(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
+        rig.receive(&MavMessage::TD_OPERATOR(TD_OPERATOR_DATA {
             boot_number: 0,
             number,
             role,
             name: bytes.into(),
         }));
     }
-    rig.hear(&MavMessage::TD_CREW(TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() }));
+    rig.receive(&MavMessage::TD_CREW(TD_CREW_DATA { people: 2, ..TD_CREW_DATA::default() }));
     rig
 }
 
 #[test]
-fn a_screen_of_another_operator_says_beforehand_that_it_only_stops_and_the_station_refuses_the_rest() {
+fn a_screen_of_another_operator_announces_that_it_only_stops_and_the_station_refuses_the_rest() {
     let mut screen = station_of(1, "Ann", Role::Attached, "Bob");
     let shown = screen.screen(80, 24);
     assert!(shown.contains("HOLD/ABORT ONLY TWO-PERSON"), "{shown}");
@@ -572,7 +572,7 @@ fn copter(custom_mode: u32) -> MavMessage {
 fn answer_timesync(rig: &mut Rig) {
     let ts1 = i64::try_from(rig.now.as_nanos()).unwrap_or(0);
     rig.now += Duration::from_millis(20);
-    rig.hear(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
+    rig.receive(&MavMessage::TIMESYNC(TIMESYNC_DATA { tc1: 5, ts1, ..Default::default() }));
 }
 
 /// A copter in a mode whose number is a phase of ours: ACRO (1) is PAD_IDLE, LAND (9) is POWERED.
@@ -580,10 +580,10 @@ fn beside_a_copter() -> Rig {
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
     for mode in [1, 9, 6, 0, 1] {
-        rig.hear(&copter(mode));
-        rig.hear(&MavMessage::VFR_HUD(VFR_HUD_DATA { alt: 584.0, climb: 1.5, ..VFR_HUD_DATA::default() }));
-        rig.hear(&MavMessage::ATTITUDE(ATTITUDE_DATA { roll: 0.1, ..ATTITUDE_DATA::default() }));
-        rig.hear(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        rig.receive(&copter(mode));
+        rig.receive(&MavMessage::VFR_HUD(VFR_HUD_DATA { alt: 584.0, climb: 1.5, ..VFR_HUD_DATA::default() }));
+        rig.receive(&MavMessage::ATTITUDE(ATTITUDE_DATA { roll: 0.1, ..ATTITUDE_DATA::default() }));
+        rig.receive(&MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
             lat: 473_977_420,
             lon: 85_455_940,
             alt: 584_000,
@@ -598,11 +598,11 @@ fn beside_a_copter() -> Rig {
 
 /// It dates some of its messages only: the age of the last of those is not that of the link.
 #[test]
-fn a_copter_that_is_heard_ten_times_a_second_is_never_lost() {
+fn a_copter_received_ten_times_a_second_is_never_lost() {
     let mut rig = beside_a_copter();
     for _ in 0..90 {
-        rig.hear(&copter(1));
-        rig.hear(&MavMessage::VFR_HUD(VFR_HUD_DATA::default()));
+        rig.receive(&copter(1));
+        rig.receive(&MavMessage::VFR_HUD(VFR_HUD_DATA::default()));
         rig.run(0.1);
     }
     let screen = rig.screen(80, 24);
@@ -636,7 +636,7 @@ fn a_copter_is_shown_as_a_copter_and_is_never_armed_from_here() {
 }
 
 #[test]
-fn an_abort_of_a_copter_asks_first_and_says_what_it_would_do() {
+fn an_abort_of_a_copter_is_confirmed_first_and_names_its_effect() {
     let mut rig = beside_a_copter();
     rig.take_commands();
     rig.abort();
@@ -668,10 +668,10 @@ fn a_heartbeat_alone_does_not_make_a_vehicle_ours() {
 #[test]
 fn a_copter_beside_our_vehicle_under_its_id_is_a_second_vehicle() {
     let mut rig = Rig::crewed();
-    rig.hear(&copter(1));
+    rig.receive(&copter(1));
     rig.run(0.1);
     assert!(first_line(&rig, 80, 24).contains("TWO VEHICLES under id 1"), "{}", first_line(&rig, 80, 24));
-    assert!(rig.screen(80, 24).contains("PAD_"), "what ours tells stays");
+    assert!(rig.screen(80, 24).contains("PAD_"), "our vehicle's values stay");
     rig.keys(&ladder());
     assert_eq!(rig.take_commands(), []);
     rig.abort();
@@ -704,7 +704,7 @@ fn no_screen_acts_with_the_key_of_another_person() {
     let mut random = Random(1);
     let mut stations =
         [(1, "Ann"), (2, "Bob")].map(|(number, name)| station_of(number, name, Role::Station, name));
-    // The ask that waits at the vehicle: the key, and the person who really asked.
+    // The proposal that waits at the vehicle: the key, and the person who really proposed.
     let mut waits: Option<(u8, &str)> = None;
     let (mut sent, mut agreed) = (0, 0);
     for step in 0..1_000_000_u32 {
@@ -723,7 +723,7 @@ fn no_screen_acts_with_the_key_of_another_person() {
             station.uplink();
             let act = random.of(&[TdAct::TD_ACT_NONE, TdAct::TD_ACT_ARM, TdAct::TD_ACT_START]);
             let asked_by = waits.map_or(0, |(key, _)| key);
-            station.hear(&MavMessage::TD_CREW(TD_CREW_DATA {
+            station.receive(&MavMessage::TD_CREW(TD_CREW_DATA {
                 people: 2,
                 ask_number: 7,
                 ask_left_ms: 9_000,
@@ -790,7 +790,7 @@ fn no_foreign_vehicle_is_ever_armed_or_started() {
                     mavtype = MavType::MAV_TYPE_QUADROTOR;
                 }
                 let armed = random.below(2) == 1;
-                rig.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+                rig.receive(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
                     custom_mode: random.below(14) as u32,
                     autopilot,
                     mavtype,

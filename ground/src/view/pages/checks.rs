@@ -21,7 +21,7 @@ use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
 /// Columns of one value beside others.
 const VALUE_COLUMNS: usize = 39;
 
-/// How the check stands, its values, the radio.
+/// The state of the check, its values, the radio.
 pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> Vec<Line<'static>> {
     let check = model.vehicle.pad_check.as_ref();
     let mut lines = vec![headline(model, check, theme, now)];
@@ -43,7 +43,7 @@ pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
     lines
 }
 
-/// What runs, or what came of it, and the keys.
+/// The running check, or its outcome, and the keys.
 fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration) -> Line<'static> {
     use TdPadCheckState as S;
     let [all, still] = [Act::Check, Act::CheckStill].map(Act::key_name);
@@ -54,42 +54,44 @@ fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration
             theme.label(format!("  {all} ends it")),
         ]);
     }
-    let Some(check) = check.filter(|check| check.told.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
+    let Some(check) = check.filter(|check| check.report.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
         return Line::from(vec![theme.plain(" no check yet"), theme.label(begin)]);
     };
     let failing = check.failing().count();
-    let (words, role, then) = match check.told.state {
+    let (words, role, then) = match check.report.state {
         S::TD_PAD_CHECK_STATE_RUNNING => (
-            format!(" CHECK {} RUNS {} %: hands off", check.told.run, check.told.progress),
+            format!(" CHECK {} RUNS {} %: hands off", check.report.run, check.report.progress),
             TextRole::Caution,
             format!("  {all} ends it"),
         ),
         S::TD_PAD_CHECK_STATE_PASSED if check.awaits_eyes() => (
-            format!(" CHECK {} PASSED but for what only people see", check.told.run),
+            format!(" CHECK {} PASSED but for what only people see", check.report.run),
             TextRole::Caution,
-            format!("  {} says it", Act::Seen.key_name()),
+            format!("  {} confirms it", Act::Seen.key_name()),
         ),
-        S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {} PASSED", check.told.run), TextRole::Good, begin),
-        S::TD_PAD_CHECK_STATE_FAILED => {
-            (format!(" CHECK {} FAILED: {failing} outside", check.told.run), TextRole::Alarm, begin)
+        S::TD_PAD_CHECK_STATE_PASSED => {
+            (format!(" CHECK {} PASSED", check.report.run), TextRole::Good, begin)
         }
-        _ => (format!(" CHECK {} STOPPED early", check.told.run), TextRole::Caution, begin),
+        S::TD_PAD_CHECK_STATE_FAILED => {
+            (format!(" CHECK {} FAILED: {failing} outside", check.report.run), TextRole::Alarm, begin)
+        }
+        _ => (format!(" CHECK {} STOPPED early", check.report.run), TextRole::Caution, begin),
     };
-    let told = seconds(now.saturating_sub(check.told_at));
-    let by = Some(check.told.asked_by).filter(|number| *number > 0);
+    let report = seconds(now.saturating_sub(check.reported_at));
+    let by = Some(check.report.asked_by).filter(|number| *number > 0);
     let by = by.map_or_else(String::new, |number| format!(", {}", model.operator(number)));
-    Line::from(vec![theme.span(words, role), theme.label(format!(" ({told} ago{by})")), theme.label(then)])
+    Line::from(vec![theme.span(words, role), theme.label(format!(" ({report} ago{by})")), theme.label(then)])
 }
 
 /// Battery and storage, outside of a check too.
 pub fn supply(model: &Model, theme: Theme) -> Line<'static> {
-    let not_told = || "not told".to_owned();
-    let battery = model.vehicle.battery().map_or_else(not_told, |battery| {
+    let not_reported = || "not reported".to_owned();
+    let battery = model.vehicle.battery().map_or_else(not_reported, |battery| {
         let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
         format!("{} V{left}", fixed(battery.value.volts, 2))
     });
     let free = |space: Sample<f64>| format!("{} MiB free", fixed(space.value, 0));
-    let space = model.vehicle.log_space_mib().map_or_else(not_told, free);
+    let space = model.vehicle.log_space_mib().map_or_else(not_reported, free);
     let [battery, space] = [battery, space].map(|words| theme.plain(words));
     Line::from(vec![
         theme.label(" battery "),
@@ -108,18 +110,18 @@ fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
     }
 }
 
-/// One surface: range, error and lag, each with its limit; of one that tells nothing, what people
-/// see.
+/// One surface: range, error and lag, each with its limit; of one without feedback, its expected
+/// motion.
 fn surface(check: Option<&PadCheck>, (name, first, seen): (&str, u32, &str), theme: Theme) -> Line<'static> {
     let values: Vec<Option<&TD_PAD_CHECK_DATA>> = (first..first + 3)
         .map(|item| check.and_then(|check| check.values().find(|value| value.item as u32 == item)))
         .collect();
     let mut spans = vec![theme.plain(format!(" {name:<13}"))];
-    let tells = values
+    let is_judged = values
         .iter()
         .flatten()
         .any(|value| value.verdict != TdPadCheckVerdict::TD_PAD_CHECK_VERDICT_NOT_JUDGED);
-    if check.is_some() && !tells {
+    if check.is_some() && !is_judged {
         spans.push(theme.plain(seen.to_owned()));
         return Line::from(spans);
     }
@@ -160,8 +162,8 @@ fn cell(value: &TD_PAD_CHECK_DATA, theme: Theme) -> Vec<Span<'static>> {
     ]
 }
 
-/// The radio range test in one line, because the smallest whole screen has no more: what was found
-/// with its limits.
+/// The radio range test in one line, because the smallest full screen has no more: each result with
+/// its limit.
 fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(test) = model.range_test.as_ref() else {
         let begins = format!("  {} begins one: 30 s, antennas as in flight", Act::RangeTest.key_name());
@@ -174,8 +176,8 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         (false, None, true) => ("PASSED".to_owned(), TextRole::Good),
         (false, None, false) => ("FAILED".to_owned(), TextRole::Alarm),
     };
-    let judged = |is_kept: bool, words: String| {
-        let (mark, role) = if is_kept { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
+    let judged = |is_met: bool, words: String| {
+        let (mark, role) = if is_met { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         theme.span(format!(" {mark} {words}"), role)
     };
     let loss =
@@ -187,12 +189,11 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         spans.push(judged(margin_db >= MARGIN_LEAST_DB, format!("margin {} dB", fixed(margin_db, 1))));
     }
     let least = || format!(" least {MARGIN_LEAST_DB:.0}");
-    spans.push(theme.label(found.margin_db.map_or_else(|| " no margin told".to_owned(), |_| least())));
+    spans.push(theme.label(found.margin_db.map_or_else(|| " no margin".to_owned(), |_| least())));
     Line::from(spans)
 }
 
-// The page that helps to find the vehicle: where it was last heard, where it is predicted, and the
-// way there.
+// The page that helps to find the vehicle: its last and its predicted position, and the way there.
 
 /// Columns of the arrow at 80 columns, and of the words.
 const ARROW_COLUMNS: u16 = 14;
@@ -200,8 +201,8 @@ const WORD_COLUMNS: u16 = 33;
 /// Rows of the words above the arrow.
 const WORD_ROWS: u16 = 15;
 
-/// Draws an arrow that points to where it is, what is known of the place, the way over the ground,
-/// and the code for a phone.
+/// Draws an arrow that points to the vehicle, its positions, the way over the ground, and the code
+/// for a phone.
 pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let (walk, middle, right) = if Room::of(frame.area()) == Room::Small {
         columns(area, [Length(ARROW_COLUMNS), Length(WORD_COLUMNS), Fill(1)]).into()
@@ -257,7 +258,7 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     let label = |words: &'static str| theme.line(words, TextRole::Label);
     let Some(place) = model.last_place(now).or(model.place) else {
         return vec![if model.vehicle.left_pad_at.is_some() {
-            theme.line(" The vehicle has left the pad, and has not told its place.", TextRole::Caution)
+            theme.line(" The vehicle has left the pad, and has not reported its position.", TextRole::Caution)
         } else {
             label(
                 " The vehicle has not left the pad. In flight its last place is kept beside the log, for maps.",
@@ -270,33 +271,33 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         lines.push(theme.line(" PREDICTED: look here first", TextRole::Caution));
         lines.extend(spot(model, &place, predicted, theme));
     }
-    let from = if place.way(&place.heard, model.settings.here).from_station { "here" } else { "the pad" };
-    lines.push(theme.line(format!(" Last heard, from {from}"), TextRole::Title));
-    lines.extend(spot(model, &place, &place.heard, theme));
-    let ago = now_unix_s.saturating_sub(place.heard_unix_s);
+    let from = if place.way(&place.received, model.settings.here).from_station { "here" } else { "the pad" };
+    lines.push(theme.line(format!(" Last received, from {from}"), TextRole::Title));
+    lines.extend(spot(model, &place, &place.received, theme));
+    let ago = now_unix_s.saturating_sub(place.received_unix_s);
     lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
     lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
     lines.push(supply(model, theme));
     if place.pad.is_none() {
-        lines.push(label(" The vehicle has not told where its pad is: no latitude, longitude or KML"));
+        lines.push(label(" The vehicle has not reported its pad: no latitude, longitude or KML"));
     } else if model.settings.here.is_none() {
         lines.push(label(" The way from here needs this place: `here` in the settings"));
     }
     lines
 }
 
-/// It was last heard on the pad, in a countdown that must have ended.
+/// The last telemetry was from the pad, in a countdown that must have ended.
 fn may_have_left_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let caution = |words: &'static str| theme.line(words, TextRole::Caution);
     let mut lines = vec![theme.line(" MAY BE IN THE AIR since T-0", TextRole::Alarm)];
-    let Some(meant) = model.meant_to_come_down() else {
-        lines.push(caution(" It has not told the fence of its mission: look around the pad."));
+    let Some(intended) = model.intended_touchdown() else {
+        lines.push(caution(" It has not reported the fence of its mission: look around the pad."));
         return lines;
     };
-    let (north, east) = (fixed(meant.north_m, 0), fixed(meant.east_m, 0));
-    lines.push(Line::from(format!(" meant to land north {north} m, east {east} m of the pad, within")));
-    lines.push(Line::from(format!(" {} m, the fence of its mission", fixed(meant.error_m, 0))));
-    lines.extend(degrees(model.vehicle.pad.map(|pad| pad.moved(meant.north_m, meant.east_m))));
+    let (north, east) = (fixed(intended.north_m, 0), fixed(intended.east_m, 0));
+    lines.push(Line::from(format!(" should land north {north} m, east {east} m of the pad, within")));
+    lines.push(Line::from(format!(" {} m, the fence of its mission", fixed(intended.error_m, 0))));
+    lines.extend(degrees(model.vehicle.pad.map(|pad| pad.moved(intended.north_m, intended.east_m))));
     lines.push(caution(" Under a parachute, or without its landing motor, it may come down farther away."));
     lines
 }

@@ -10,7 +10,7 @@ use ratatui::layout::{Layout, Rect, Spacing};
 use ratatui::text::Line;
 
 use super::{Room, columns, events, framed, rows, table};
-use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_unheard, quantity::Quantity, words};
+use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_silent, quantity::Quantity, words};
 use crate::view::band::draw_band;
 use crate::view::pictures::attitude::{Side, draw_attitude};
 use crate::view::pictures::height::draw_height;
@@ -35,13 +35,15 @@ const BELOW_ROWS: u16 = 11;
 
 /// Draws the page of the ascent, of the descent or of the burn. Returns where the pictures are.
 pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Rect {
-    // What the newest report means, under the number.
+    // The newest state in words, under the number.
     let descent = model.vehicle.descent();
     let below = match model.page() {
-        Page::Ascent => state("booster", descent.as_ref().map(|told| told.clone().map(booster)), theme, now),
+        Page::Ascent => {
+            state("booster", descent.as_ref().map(|report| report.clone().map(booster)), theme, now)
+        }
         Page::Landing => {
-            let told = model.vehicle.last::<TD_CONTROLLER_DATA>();
-            state("burn", told.map(|told| told.map(|told| panels::steered(told.level))), theme, now)
+            let report = model.vehicle.last::<TD_CONTROLLER_DATA>();
+            state("burn", report.map(|report| report.map(|report| panels::steered(report.level))), theme, now)
         }
         _ => band_word(model, theme, now),
     };
@@ -54,7 +56,7 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         draw_band((&main, below, &others), theme, frame, area)
     };
     if Room::of(frame.area()) == Room::Small {
-        let side = Length(if is_unheard(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
+        let side = Length(if is_silent(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
         let (left, place, side) = if burns {
             let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
             let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
@@ -85,7 +87,7 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         draw_lines(frame, inside, &lines);
     } else {
         let mut lines = values(model, theme, now, &VALUES);
-        lines.insert(0, state("chute", descent.map(|told| told.map(chute)), theme, now));
+        lines.insert(0, state("chute", descent.map(|report| report.map(chute)), theme, now));
         table("flight", &lines, theme, frame, left);
     }
     bars::draw_surfaces(model, theme, now, frame, middle);
@@ -109,7 +111,7 @@ pub fn map(title: &str, model: &Model, theme: Theme, now: Duration, frame: &mut 
 
 /// The vehicle from each of these sides; after the loss of the link its predicted position instead.
 pub fn vehicle(model: &Model, sides: &[Side], theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if is_unheard(&model.vehicle, now) {
+    if is_silent(&model.vehicle, now) {
         return table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
     }
     let beside = Layout::horizontal(sides.iter().map(|_| Fill(1))).spacing(Spacing::Overlap(1));
@@ -123,11 +125,11 @@ static VALUES: [&str; 7] =
     ["tilt", "horizontal speed", "distance", "touchdown north", "touchdown east", "wind", "drag"];
 
 /// A fin follows if it is nearer to its command than this, degrees: the 0.1 rad of the vehicle's
-/// own gate.
+/// gate.
 const FOLLOWS_DEG: f64 = 5.7;
 
-/// What the vehicle tells of the gate of its ignition with the limits that it tells, and how many
-/// of them are met. It checks more itself.
+/// The reported conditions of the ignition gate with their limits, and how many are met. The
+/// vehicle checks more itself.
 fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Vec<Line<'static>>)> {
     let vehicle = &model.vehicle;
     let descent = vehicle.descent()?;
@@ -178,12 +180,12 @@ fn values(model: &Model, theme: Theme, now: Duration, names: &[&str]) -> Vec<Lin
 /// A state of the newest report, in words.
 fn state(
     label: &str,
-    told: Option<Sample<(String, TextRole)>>,
+    report: Option<Sample<(String, TextRole)>>,
     theme: Theme,
     now: Duration,
 ) -> Line<'static> {
-    let Some(told) = told else { return text_row(theme, label, (" ", TextRole::Label), "no data", "") };
-    let ((mark, age), (text, role)) = (age_mark(&told, now), &told.value);
+    let Some(report) = report else { return text_row(theme, label, (" ", TextRole::Label), "no data", "") };
+    let ((mark, age), (text, role)) = (age_mark(&report, now), &report.value);
     text_row(theme, label, (mark, if age == TextRole::Stale { age } else { *role }), text, "")
 }
 
@@ -205,12 +207,12 @@ fn chute(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
 /// Compares the height with the ignition band and the commit height, in words.
 fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     if model.vehicle.in_flight() && status_lines::is_inhibited(&model.vehicle) {
-        // Without a parachute the row of the state says it.
+        // Without a parachute the row of the state shows it.
         let under_chute = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
         let words = if under_chute { " NO BURN: motor inhibited" } else { "" };
         return theme.line(words, TextRole::Alarm);
     }
-    // Before the fall, and after it, there is nothing to compare.
+    // Before the fall, and after it, no band is reported.
     let Some(descent) = model.vehicle.descent().filter(|_| model.vehicle.in_flight()) else {
         return theme.line(" band --", TextRole::Label);
     };

@@ -21,8 +21,8 @@ const MESSAGE_CELL_WIDTH: usize = 39;
 const REGULAR: &str = "HEARTBEAT SYS_STATUS EXTENDED_SYS_STATE TD_FLIGHT_STATUS ATTITUDE_QUATERNION \
     LOCAL_POSITION_NED VFR_HUD TD_FINS TD_GIMBAL TD_DESCENT TD_CONTROLLER TD_TOUCHDOWN_PREDICTION TD_PREDICTED_PATH";
 
-/// What was rejected and by whom; the rates of all links together, of each link and of each
-/// component; age and rate of every message.
+/// Rejected frames by reason; the rates of all links together, of each link and of each component;
+/// age and rate of every message.
 pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let mut lines = rejected(model, theme, now);
     let heading = cells(["over 10 s", "rx B/s", "tx", "frames/s", "loss", "copies", "age"]);
@@ -31,7 +31,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, columns: usize, rows: u
         lines.push(report_line(&report, theme));
         lines.extend(report.sources.iter().map(|source| source_line(source, model.settings.vehicle, theme)));
     }
-    let older = format!(" what the vehicle says; {STALE_MARK} older than {}", seconds(STALE_AFTER));
+    let older = format!(" messages of the vehicle; {STALE_MARK} older than {}", seconds(STALE_AFTER));
     lines.push(theme.line(older, TextRole::Title));
     lines.extend(message_lines(model, theme, now, columns));
     // Scrolling up goes towards the first line.
@@ -43,8 +43,7 @@ fn cells([name, rx, tx, frames, loss, copies, age]: [&str; 7]) -> String {
     format!(" {name:<NAME_WIDTH$.NAME_WIDTH$}{rx:>11}{tx:>6}{frames:>9}{loss:>8}{copies:>8}{age:>9}")
 }
 
-/// Counts of rejected frames by reason, what the vehicle refuses, and what a radio reports about
-/// itself.
+/// Counts of rejected frames by reason, the vehicle's refusals, and a radio's report about itself.
 fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let FramerCounters { crc_errors, unknown_ids, cut_short, unknown_flags, garbage_bytes, .. } =
         model.link.framing;
@@ -147,13 +146,15 @@ fn message_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     (0..rows)
         .map(|row| {
             let cells = (0..across).filter_map(|column| messages.get(row + column * rows));
-            Line::from(cells.flat_map(|(name, heard)| message_cell(name, *heard, theme)).collect::<Vec<_>>())
+            Line::from(
+                cells.flat_map(|(name, received)| message_cell(name, *received, theme)).collect::<Vec<_>>(),
+            )
         })
         .collect()
 }
 
-fn message_cell(name: &str, heard: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
-    let (text, role) = match heard {
+fn message_cell(name: &str, received: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
+    let (text, role) = match received {
         None => ("  never".to_owned(), TextRole::Label),
         Some(MessageFigures { age, rx_frames_s, .. }) => {
             let (mark, role) =
@@ -171,7 +172,7 @@ fn messages(model: &Model, now: Duration) -> Vec<(&'static str, Option<MessageFi
         let name = message_name(figures.message_id).filter(|_| figures.source == model.settings.vehicle);
         let Some(name) = name else { continue };
         match messages.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, heard)) => *heard = Some(figures),
+            Some((_, received)) => *received = Some(figures),
             None => messages.push((name, Some(figures))),
         }
     }

@@ -67,13 +67,13 @@ pub fn messages_lines(model: &Model, theme: Theme, columns: usize, rows: usize) 
 
 // The log page: whether the flight is recorded, and where.
 
-/// The end of the book: how many entries, the head, whether it is signed, and what the vehicle has
-/// of it.
+/// The end of the book: its entries, its head, whether it is signed, and how many entries the
+/// vehicle has confirmed.
 fn book(model: &Model) -> String {
     let Some(signed) = model.book.head else { return "none".to_owned() };
     let (entries, hash) = (signed.head.entries, protocol::book::shown(&signed.head.hash[..6]));
     let is_signed = if model.book.is_signed { "signed" } else { "not signed" };
-    format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.kept)
+    format!("{entries} entries, head {hash}, {is_signed}; {} at the vehicle", model.book.confirmed)
 }
 
 /// The state of the recording, its files and counts.
@@ -104,7 +104,7 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),
         Line::default(),
-        theme.line(" Both directions of the link and all that the crew does are recorded.", TextRole::Label),
+        theme.line(" Both directions of the link and all actions of the crew are recorded.", TextRole::Label),
         theme.line(" Records older than 0.2 s are on disk, even if this program crashes.", TextRole::Label),
     ]
 }

@@ -12,8 +12,8 @@ use ratatui::text::Line;
 use super::flight::map;
 use super::{Room, columns, events, framed, rows, table};
 use crate::model::{
-    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, hold_words, is_on_pad, unheard_hints,
-    why_not_here, why_untested, words,
+    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, hold_words, is_on_pad, link_hints, why_not_here,
+    why_untested, words,
 };
 use crate::view::band::{Item, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
@@ -26,8 +26,8 @@ const STEP_COLUMNS: [u16; 2] = [30, 38];
 /// Rows of the panels under the pictures.
 const BELOW_ROWS: u16 = 12;
 
-/// Draws GO or what fails, the next step, the steps; and the vehicle with what is around the pad,
-/// or the checks while something is amiss.
+/// Draws GO or the failing checks, the next step, the steps; and the vehicle and the map of the
+/// pad, or the checks while one fails.
 pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let area =
         if headline::banner(model, now).is_some() { area } else { draw_go(model, theme, now, frame, area) };
@@ -122,7 +122,7 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
-        let hints = unheard_hints(model, now).unwrap_or_default();
+        let hints = link_hints(model, now).unwrap_or_default();
         let wrapped = |words: String| lists::wrap(&words, usize::from(CHECK_COLUMNS - 2));
         let lines = hints.into_iter().flat_map(wrapped);
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
@@ -148,7 +148,7 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
     let motor = motor(model, theme);
     lines.extend(motor.clone().filter(|_| why_untested(model).is_some()));
     let failed = status.value.checks_failed;
-    lines.extend(failed.iter_names().map(|check| match model.vehicle.told_of(check.1) {
+    lines.extend(failed.iter_names().map(|check| match model.vehicle.reported_words(check.1) {
         // A value that is measured now is better than the vehicle's words for an earlier one.
         Some(words) if !found(check.1).contains(' ') => Line::from(vec![
             theme.span(" NO ", TextRole::Alarm),
@@ -168,8 +168,7 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
     lines
 }
 
-/// Whether burns of its lot confirm the landing motor, once the vehicle has said which mission it
-/// flies.
+/// Whether burns of its lot confirm the landing motor, once the vehicle has reported its mission.
 fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
     let burns = model.vehicle.mission()?.motor_burns;
     let (word, found) = match burns {
@@ -199,7 +198,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     match model.vehicle.status.as_ref() {
         Some(_) if held.is_some() || unfit.is_some() => (held.or(unfit).unwrap_or_default(), TextRole::Alarm),
         _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
-        None if unheard_hints(model, now).is_some() => ("nothing heard".to_owned(), TextRole::Caution),
+        None if link_hints(model, now).is_some() => ("nothing received".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
         Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {
             top_lines::readiness(model, now).unwrap_or_default()
@@ -273,7 +272,7 @@ fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
             let ends = vehicle.prediction.map(|prediction| prediction.value.touchdown.violations());
             (ends.map_or_else(String::new, |outside| outside.unwrap_or("inside".into())), "outside")
         }
-        TdCheck::TD_CHECK_UPLINK => unseen("not heard"),
+        TdCheck::TD_CHECK_UPLINK => unseen("not alive"),
         TdCheck::TD_CHECK_HEIGHT => unseen("too low"),
         TdCheck::TD_CHECK_BATTERY => {
             (number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"), "too low")
@@ -302,12 +301,12 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         |(done, all)| format!("checks; checklist {done}/{all} ({})", Act::Checklist.key_name()),
     );
     let rungs = [
-        (model.link.state(now).carries(), "the vehicle is heard".to_owned()),
-        (model.link.uplink.is_proven(now), "it hears us".to_owned()),
+        (model.link.state(now).carries(), "downlink alive".to_owned()),
+        (model.link.uplink.is_proven(now), "uplink proven".to_owned()),
         (pin_out, "pin out (first inhibit)".to_owned()),
         (checked && model.why_checklist(now).is_none(), checks),
         (armed, then(Act::Arm, "ARM")),
-        (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed, says HEARTBEAT".to_owned()),
+        (armed && phase == Some(TdPhase::TD_PHASE_PAD_ARMED), "armed (HEARTBEAT)".to_owned()),
         (counting, then(Act::Start, "START")),
     ];
     let next = rungs.iter().position(|(stands, _)| !stands);
@@ -323,12 +322,12 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
             Line::from(vec![theme.span(mark, mark_role), theme.span(words, role)])
         })
         .collect();
-    // Without --mission nothing but the crew compares it with what they mean to fly.
+    // Without --mission only the crew compares it with the intended mission.
     lines.extend(vehicle.mission().map(|mission| {
         theme.line(format!("   {} {:.8}", mission.in_words(), mission.hash.to_string()), TextRole::Plain)
     }));
     if let Some(number) = model.commanded_by() {
-        let here = number == model.own_number();
+        let here = number == model.operator_number();
         let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
         lines.push(theme.line(words, TextRole::Plain));
     }

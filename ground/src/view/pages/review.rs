@@ -30,7 +30,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         ("no verdict received yet".to_owned(), TextRole::Caution)
     };
     let (words, role) = ended.unwrap_or(none);
-    let silent = unheard(model, now).map_or_else(String::new, |words| format!("; {words}"));
+    let silent = silence_words(model, now).map_or_else(String::new, |words| format!("; {words}"));
     let report = Act::Report.works(model, now);
     let report = report.then(|| theme.label(format!("  {} writes the report", Act::Report.key_name())));
     let mut sentence = Line::from(theme.span(format!(" {words}{silent}"), role));
@@ -73,12 +73,12 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     events(model, theme, frame, right);
 }
 
-/// What the vehicle says went wrong, each with its T+.
+/// The vehicle's findings of what went wrong, each with its T+.
 fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
     let findings = &model.vehicle.findings;
     let label = |words| vec![theme.line(words, TextRole::Label)];
     let count = match findings.count {
-        None => return label(" not told yet"),
+        None => return label(" not reported yet"),
         Some(0) if model.vehicle.verdict().is_none() => return label(" none reported so far"),
         Some(0) => return label(" nothing went wrong"),
         Some(count) => count,
@@ -95,13 +95,13 @@ fn findings(model: &Model, theme: Theme, columns: usize) -> Vec<Line<'static>> {
         }
     }
     if missing > 0 {
-        lines.push(theme.line(format!(" {missing} more not heard yet"), TextRole::Label));
+        lines.push(theme.line(format!(" {missing} more not received yet"), TextRole::Label));
     }
     lines
 }
 
-/// For how long nothing was heard of a flight, if it was long enough to count.
-fn unheard(model: &Model, now: Duration) -> Option<String> {
+/// The longest silence of a flight, if it was long enough to count.
+fn silence_words(model: &Model, now: Duration) -> Option<String> {
     let silence = Some(model.history.silence).filter(|silence| *silence > RED_AFTER)?;
     if model.vehicle.in_flight() && !model.link.state(now).carries() {
         return Some("link LOST before touchdown".to_owned());

@@ -136,9 +136,9 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
                 let (sin, cos) = libm::sincos((opening_rad / FIN_STEP).round() * FIN_STEP);
                 place(HINGE - length * cos, HALF_WIDTH + per_dot + length * sin)
             };
-            let (asked, is) = (theme.ink(Ink::Predicted), theme.ink(Ink::Measured));
+            let (command_ink, is) = (theme.ink(Ink::Predicted), theme.ink(Ink::Measured));
             if fin.error_deg() > APART_DEG {
-                stroke(context, at(fin.commanded_rad, 0.0), at(fin.commanded_rad, FIN), asked);
+                stroke(context, at(fin.commanded_rad, 0.0), at(fin.commanded_rad, FIN), command_ink);
             }
             for beside in [0.0, per_dot] {
                 let [x, y, z] = at(fin.measured_rad, FIN);
@@ -178,8 +178,8 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
 /// the last metres has less.
 const THRUST_MIN_M_S2: f64 = 4.0;
 
-/// Whether a motor gives thrust, by what the vehicle has measured: the phases after an ignition
-/// that was only commanded, and the acceleration as soon as it is known.
+/// Whether a motor gives thrust, by the vehicle's measurements: the phases after an ignition that
+/// was only commanded, and the acceleration as soon as it is estimated.
 fn gives_thrust(vehicle: &Vehicle) -> bool {
     let phase = match vehicle.phase_now() {
         Some(TdPhase::TD_PHASE_BOOST) => vehicle.has_lifted,

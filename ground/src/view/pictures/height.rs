@@ -10,7 +10,7 @@ use ratatui::widgets::canvas::Line;
 use super::{Ink, TextRole, Theme, scales, seconds_since, ticks};
 use crate::model::{
     Model,
-    dead_reckoning::{foreseen, predict_position},
+    dead_reckoning::{predict_position, predicted_course},
     is_burning,
     quantity::Quantity,
 };
@@ -23,8 +23,8 @@ const TOP_MIN_M: f64 = 10.0;
 const TICK_ROWS: u16 = 3;
 const TICK_COLUMNS: u16 = 7;
 
-/// Draws height over time: flown, predicted to the touchdown, where lighting lands, where it will
-/// be lit, and the height below which no parachute opens.
+/// Draws height over time: flown, predicted to the touchdown, the ignition band, the planned
+/// ignition, and the height below which no parachute opens.
 pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if area.width < 16 || area.height < 4 {
         return;
@@ -33,8 +33,9 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let from = flight_began(model).unwrap_or(now);
     let until = shown_until(model, now);
     let present_s = seconds_since(until, from);
-    let foreseen = foreseen(vehicle, now).into_iter();
-    let to_come: Vec<(f64, f64)> = foreseen.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
+    let predicted_course = predicted_course(vehicle, now).into_iter();
+    let to_come: Vec<(f64, f64)> =
+        predicted_course.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
     let known = |height: Option<f64>| height.filter(|height_m| height_m.is_finite() && *height_m > 0.0);
     let of = |pick| known(vehicle.of_descent(pick).map(|sample| sample.value));
     let falls = matches!(
@@ -45,11 +46,11 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let apogee_m = of(|d| d.apogee_m);
     let band = of(|d| d.band_low_m).zip(of(|d| d.band_high_m)).filter(|_| lights);
     let commit_m = of(|d| d.commit_height_m).filter(|_| falls);
-    let lit = model.history.timeline.iter().find(|(phase, _)| *phase == TdPhase::TD_PHASE_POWERED);
-    let lit_s = lit.map(|(_, at)| seconds_since(*at, from));
-    // The burn fills the picture: what was flown before it tells nothing about its end.
+    let ignition = model.history.timeline.iter().find(|(phase, _)| *phase == TdPhase::TD_PHASE_POWERED);
+    let ignited_at_s = ignition.map(|(_, at)| seconds_since(*at, from));
+    // The burn fills the picture: the flight before it is irrelevant to its end.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
-    let ignited_s = lit_s.map_or(present_s, |lit_s| lit_s.min(present_s));
+    let ignited_s = ignited_at_s.map_or(present_s, |ignited_at_s| ignited_at_s.min(present_s));
     let begins_s = if burns { (ignited_s - 1.0).floor().max(0.0) } else { 0.0 };
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
@@ -91,13 +92,14 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     let (label, predicted) = (theme.style(TextRole::Label), ink(Ink::Predicted));
-    let lit_at = lit_s.and_then(|lit_s| flown.iter().copied().find(|(at, _)| *at >= lit_s));
+    let ignited_at =
+        ignited_at_s.and_then(|ignited_at_s| flown.iter().copied().find(|(at, _)| *at >= ignited_at_s));
     let lands_at = to_come.last().filter(|(_, height_m)| *height_m < 1.0).map(|(at, _)| (*at, 0.0));
     let here = height_m.map(|height_m| (present_s, height_m.value.max(0.0)));
     let lost_at = predict_position(vehicle, now).map(|at| (present_s, at.altitude_m));
     let marks = [
         (lost_at, "+", predicted),
-        (lit_at, "▲", ink(Ink::Flame)),
+        (ignited_at, "▲", ink(Ink::Flame)),
         (lands_at, "×", predicted),
         (lights_at, "▲", predicted),
         (here, "●", theme.style(TextRole::Title)),
@@ -113,7 +115,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let rises = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
     let top = highest.filter(|(at, _)| *at > 0.0);
     let labels = [
-        lights_at.map(|at| ((since_s, at.1), words("lights ", at), predicted)),
+        lights_at.map(|at| ((since_s, at.1), words("ignition ", at), predicted)),
         band.filter(|_| lights_at.is_none()).map(|(low_m, high_m)| {
             let words = format!("band {}..{}", whole(low_m), whole(high_m));
             ((since_s, f64::midpoint(low_m, high_m)), vec![words], good)
@@ -121,7 +123,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         commit_m.map(|m| ((since_s, m), vec![format!("commit {}", whole(m))], ink(Ink::Limit))),
         apogee_m.filter(|_| rises).map(|m| ((since_s, m), vec![format!("apogee {}", whole(m))], predicted)),
         top.filter(|_| !rises).map(|at| (at, words("", at), label)),
-        lit_at.map(|at| (at, words("lit ", at), label)),
+        ignited_at.map(|at| (at, words("ignition ", at), label)),
     ];
     for (at, words, style) in labels.into_iter().flatten() {
         plane.beside(frame, at, &words, style);

@@ -237,9 +237,9 @@ fn words(
 
 /// Where the wind blows to, as an arrow, and its speed.
 fn wind(model: &Model) -> String {
-    let known =
+    let reported =
         model.vehicle.descent().map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
-    let Some((north, east)) = known.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
+    let Some((north, east)) = reported.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
         return String::new();
     };
     let eighth = libm::round(libm::atan2(east, north).to_degrees() / 45.0).rem_euclid(8.0) as usize;

@@ -52,11 +52,11 @@ pub(crate) struct Rig {
     pub(crate) latch: TdLatch,
     /// Whether the vehicle sends anything at all.
     pub(crate) speaks: bool,
-    /// Whether it reports that it hears this station.
-    pub(crate) hears: bool,
+    /// Whether it reports that it receives this station.
+    pub(crate) uplink_alive: bool,
     /// Whether it was this station that armed it.
     pub(crate) armed_here: bool,
-    heard_at: Duration,
+    uplink_at: Duration,
     /// When the vehicle was switched on.
     booted_at: Duration,
     encoder: Encoder,
@@ -83,15 +83,15 @@ impl Rig {
             hold: TdHold::TD_HOLD_NONE,
             latch: TdLatch::TD_LATCH_NONE,
             speaks: true,
-            hears: true,
+            uplink_alive: true,
             armed_here: true,
-            heard_at: Duration::ZERO,
+            uplink_at: Duration::ZERO,
             booted_at: Duration::ZERO,
             encoder: Encoder::new(VEHICLE),
         }
     }
 
-    /// A ground station with a crew that has heard its vehicle.
+    /// A ground station with a crew that has received its vehicle.
     pub(crate) fn crewed() -> Self {
         let mut rig = Self::new(settings(false, true));
         rig.run(1.0);
@@ -180,17 +180,17 @@ impl Rig {
         self.booted_at = self.now;
     }
 
-    pub(crate) fn hear(&mut self, message: &MavMessage) {
+    pub(crate) fn receive(&mut self, message: &MavMessage) {
         let frame = self.encoder.encode(message);
         self.msg(Msg::Frame(frame));
     }
 
-    pub(crate) fn hear_from(&mut self, source: Address, message: &MavMessage) {
+    pub(crate) fn receive_from(&mut self, source: Address, message: &MavMessage) {
         let frame = Encoder::new(source).encode(message);
         self.msg(Msg::Frame(frame));
     }
 
-    pub(crate) fn hear_payload(&mut self, message_id: u32, payload: &[u8]) {
+    pub(crate) fn receive_payload(&mut self, message_id: u32, payload: &[u8]) {
         if let Some(frame) = self.encoder.encode_payload(message_id, payload) {
             self.msg(Msg::Frame(frame));
         }
@@ -201,7 +201,7 @@ impl Rig {
         base_mode.set(MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED, self.armed);
         base_mode.set(MavModeFlag::MAV_MODE_FLAG_HIL_ENABLED, self.simulated && self.hil);
         let phase = self.phase as u32;
-        self.hear(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
+        self.receive(&MavMessage::HEARTBEAT(HEARTBEAT_DATA {
             custom_mode: phase | self.boot_number << PHASE_BITS,
             mavtype: MavType::MAV_TYPE_ROCKET,
             autopilot: MavAutopilot::MAV_AUTOPILOT_GENERIC,
@@ -234,21 +234,21 @@ impl Rig {
             vehicle_uid: self.uid,
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
         };
-        self.hear(&MavMessage::TD_FLIGHT_STATUS(status));
+        self.receive(&MavMessage::TD_FLIGHT_STATUS(status));
     }
 
-    /// The uplink report: while the vehicle hears this station, its last frame is 0.2 s old.
+    /// The uplink report: while the vehicle receives this station, its last frame is 0.2 s old.
     pub(crate) fn uplink(&mut self) {
         let fresh = self.now.saturating_sub(Duration::from_millis(200));
-        if self.hears {
-            self.heard_at = fresh;
+        if self.uplink_alive {
+            self.uplink_at = fresh;
         }
-        let age_ms = (self.now.saturating_sub(self.heard_at)).as_millis().min(65_534) as u16;
+        let age_ms = (self.now.saturating_sub(self.uplink_at)).as_millis().min(65_534) as u16;
         self.uplink_of(GROUND, age_ms, self.armed && self.armed_here);
     }
 
     pub(crate) fn uplink_of(&mut self, station: Address, accepted_age_ms: u16, commands: bool) {
-        self.hear(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
+        self.receive(&MavMessage::TD_UPLINK(TD_UPLINK_DATA {
             accepted_age_ms,
             refused_age_ms: u16::MAX,
             target_system: station.system_id,
@@ -282,7 +282,7 @@ impl Rig {
 
     pub(crate) fn text_of(&mut self, severity: protocol::dialect::MavSeverity, text: &str) {
         for chunk in chunks(severity, text, 7) {
-            self.hear(&MavMessage::STATUSTEXT(chunk));
+            self.receive(&MavMessage::STATUSTEXT(chunk));
         }
     }
 

@@ -41,7 +41,7 @@ impl Rig {
 
     fn attitude(&mut self, [q1, q2, q3, q4]: [f64; 4], [rollspeed, pitchspeed, yawspeed]: [f32; 3]) {
         let [q1, q2, q3, q4] = [q1, q2, q3, q4].map(|part| part as f32);
-        self.hear(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
+        self.receive(&MavMessage::ATTITUDE_QUATERNION(ATTITUDE_QUATERNION_DATA {
             time_boot_ms: self.boot_ms(),
             q1,
             q2,
@@ -56,7 +56,7 @@ impl Rig {
 
     fn motion(&mut self, [x, y, z]: [f32; 3], [vx, vy, vz]: [f32; 3]) {
         let time_boot_ms = self.boot_ms();
-        self.hear(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+        self.receive(&MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
             time_boot_ms,
             x,
             y,
@@ -74,7 +74,7 @@ impl Rig {
 
     /// Commanded and measured, in the pitch and in the yaw plane.
     pub(crate) fn gimbal(&mut self, [pitch, yaw]: [(i16, i16); 2]) {
-        self.hear(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
+        self.receive(&MavMessage::TD_GIMBAL(TD_GIMBAL_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             pitch_commanded: pitch.0,
@@ -87,7 +87,7 @@ impl Rig {
     /// Every fin fully open.
     pub(crate) fn actuated_fins(&mut self) {
         let time_boot_ms = self.boot_ms();
-        self.hear(&MavMessage::TD_FINS(TD_FINS_DATA {
+        self.receive(&MavMessage::TD_FINS(TD_FINS_DATA {
             boot_number: self.boot_number,
             time_boot_ms,
             commanded: [9000; 4],
@@ -97,7 +97,7 @@ impl Rig {
 
     /// The controller level and the state of its solver.
     pub(crate) fn controller(&mut self, level: TdControlLevel) {
-        self.hear(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
+        self.receive(&MavMessage::TD_CONTROLLER(TD_CONTROLLER_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             solve_time_us: 1_234,
@@ -111,7 +111,7 @@ impl Rig {
     pub(crate) fn plan(&mut self, violated: TdLimit) {
         let time_boot_ms = self.boot_ms();
         self.controller(TdControlLevel::TD_CONTROL_LEVEL_CONVERGED);
-        self.hear(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
+        self.receive(&MavMessage::TD_TOUCHDOWN_PREDICTION(TD_TOUCHDOWN_PREDICTION_DATA {
             boot_number: self.boot_number,
             time_boot_ms,
             time_to_go_ms: 2_300,
@@ -140,7 +140,7 @@ impl Rig {
             x[place] = (100.0 * north).round() as i16;
             altitude[place] = (100.0 * up).round() as i16;
         }
-        self.hear(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
+        self.receive(&MavMessage::TD_PREDICTED_PATH(TD_PREDICTED_PATH_DATA {
             boot_number: self.boot_number,
             x,
             altitude,
@@ -166,7 +166,7 @@ impl Rig {
     fn falls(&mut self, height_m: f32, vertical_speed_m_s: f32, chute: TdChute, touchdown_m: [f32; 2]) {
         let falls_to_m = height_m - 58.0;
         let time_to_ignition_s = if falls_to_m > 0.0 { falls_to_m / -vertical_speed_m_s } else { f32::NAN };
-        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+        self.receive(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             height_m,
@@ -190,7 +190,7 @@ impl Rig {
     /// TD_DESCENT on the way up, with the apogee that is expected: its height, m, and the time
     /// until then, s.
     pub(crate) fn ascent(&mut self, booster: TdBooster, apogee_m: f32, time_to_apogee_s: f32) {
-        self.hear(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
+        self.receive(&MavMessage::TD_DESCENT(TD_DESCENT_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             height_m: 184.8,
@@ -214,7 +214,7 @@ impl Rig {
 
     /// The design envelope of mk2's legs, and its fence.
     pub(crate) fn limits(&mut self) {
-        self.hear(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
+        self.receive(&MavMessage::TD_TOUCHDOWN_LIMITS(TD_TOUCHDOWN_LIMITS_DATA {
             boot_number: self.boot_number,
             vertical_m_s: 1.0,
             lateral_m_s: 0.7,
@@ -239,7 +239,7 @@ impl Rig {
     pub(crate) fn finding(&mut self, place: u8, found: u8, since_s: f32, text: &str) {
         let mut characters = [0; 96];
         characters[..text.len()].copy_from_slice(text.as_bytes());
-        self.hear(&MavMessage::TD_FINDING(TD_FINDING_DATA {
+        self.receive(&MavMessage::TD_FINDING(TD_FINDING_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             since_s,
@@ -255,7 +255,7 @@ impl Rig {
         // The motor has burnt out and is hot.
         (self.motor, self.approach_wait_s) = (TdMotor::TD_MOTOR_HOT, 55);
         let [distance_m, tilt_rad, vertical_m_s, lateral_m_s, rate_rad_s] = figures;
-        self.hear(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
+        self.receive(&MavMessage::TD_LANDING_VERDICT(TD_LANDING_VERDICT_DATA {
             boot_number: self.boot_number,
             time_boot_ms: self.boot_ms(),
             contact_ms: self.boot_ms(),

@@ -1,5 +1,5 @@
-//! Which vehicle is meant, and by whom: the real vehicle, and ground stations of a test that share
-//! their ids.
+//! Which vehicle a command is addressed to, and by whom: the real vehicle, and ground stations of a
+//! test that share their ids.
 
 use e2e::{ABORT, ACCEPTED, ARM, BareGround, Bound, Program, Running, START, Signal, program};
 use protocol::dialect::{COMMAND_LONG_DATA, MavCmd, MavMessage, TD_UPLINK_DATA, TdHold, TdLatch, TdPhase};
