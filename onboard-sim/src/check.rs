@@ -231,9 +231,10 @@ pub fn check(
     let Mission { name, site, airframe, motor_curve, .. } = &recipe.mission;
     let EvenLanding { height_m, speed_m_s, .. } = vehicle.landing;
     let title = format!(
-        "{name}: {:.3} kg on {}, lit at about {height_m:.0} m and {speed_m_s:.0} m/s\nSite: {site}",
+        "{name}: {:.3} kg on {}, lit at about {height_m:.0} m and {speed_m_s:.0} m/s\nSite: {site}\nWind: {}",
         airframe.mass.loaded_kg,
-        motor_curve.name()
+        motor_curve.name(),
+        recipe.dispersion.wind_over_height()
     );
     Ok(Page { title, rows })
 }

@@ -22,8 +22,7 @@ use sim::fault::TimedFault;
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::ground::RestOutcome;
-use sim::world::wind::Wind;
-use sim::world::{Actuators, Fault};
+use sim::world::{Actuators, Fault, Wind};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::run::{RunError, in_parallel};
@@ -483,14 +482,11 @@ fn spent_booster_m(flight: &Sortie) -> Option<[f64; 2]> {
     let (nose, mass_kg) = (state.nose_in_world(), booster.dry_kg);
     // The charge pushed the two apart.
     let apart_m_s = booster.separation_impulse_n_s * (1.0 / world.mass().mass_kg + 1.0 / mass_kg);
-    let truth = world.truth();
-    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0)
-        .over_height(truth.wind_exponent, truth.wind_veer_rad_m);
     let along_m2 = booster.stack_drag_coefficient * body.reference_area_m2;
     let across_m2 = body.crossflow_drag_coefficient * body.diameter_m * booster.length_m;
     let fallen = [along_m2, across_m2].map(|drag_area_m2| {
         let velocity_m_s = state.velocity_m_s - nose * apart_m_s;
-        fallen_m(state.position_m, velocity_m_s, drag_area_m2 / mass_kg, &mission.site, &wind)
+        fallen_m(state.position_m, velocity_m_s, drag_area_m2 / mass_kg, &mission.site, world.wind())
     });
     fallen.into_iter().max_by(|one, two| libm::hypot(one[0], one[1]).total_cmp(&libm::hypot(two[0], two[1])))
 }

@@ -1,12 +1,13 @@
 //! The uncertain values of a flight, as data.
 
 use crate::world::sensors::SensorParams;
+use crate::world::wind::aloft::WindsAloft;
 use flight::vehicles::file_error::FileError;
 use serde::Deserialize;
 
 /// A set of dispersions. Each value is the standard deviation of a normal distribution unless its
 /// name says otherwise.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dispersion {
     /// The sensors have errors; otherwise they are nearly exact, and the initial state is exact.
@@ -34,6 +35,9 @@ pub struct Dispersion {
     pub cg_off_axis_m: f64,
     /// Lowest and highest mean wind 10 m above the ground, m/s; the draw is uniform between them.
     pub wind_m_s: [f64; 2],
+    /// Mean wind over height instead of a draw: height above the pad, m; speed, m/s; direction it
+    /// comes from, degrees clockwise from north. The levels rise.
+    pub winds_aloft: Option<WindsAloft>,
     /// Gust intensity, as a multiple of the military standard's.
     pub gust_scale: f64,
     /// Error of the wind that the crew measures before it places the rail: of its speed, m/s.
@@ -135,9 +139,10 @@ pub const BUILTIN: &[(&str, &str)] = &[
 pub const DEFAULT: &str = "real";
 
 /// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one,
-/// twice its errors, and it with more.
+/// twice its errors, and it with more. Other winds do not matter.
 pub fn may_be_kinder(name: &str) -> bool {
-    !["real", "real-harsh", "wild"].contains(&name)
+    let set = name.split_once(" with ").map_or(name, |(set, _)| set);
+    !["real", "real-harsh", "wild"].contains(&set)
 }
 
 /// Why a set cannot be used.
@@ -164,6 +169,12 @@ impl Dispersion {
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, DispersionError> {
         let read = toml::from_str(text);
         Ok(read.map_err(|error| FileError::Parse { origin: origin.to_owned(), message: error.to_string() })?)
+    }
+
+    /// Source of the mean wind over height, in words.
+    pub fn wind_over_height(&self) -> String {
+        let words = "power law from the mean wind at 10 m, exponent 1/7 in the mean";
+        self.winds_aloft.as_ref().map_or_else(|| words.to_owned(), ToString::to_string)
     }
 
     /// The built-in set of a name.

@@ -5,6 +5,7 @@ use core::f64::consts::TAU;
 use crate::world::normal;
 use crate::world::truth::{SHAPE_MOST, SHAPE_TERMS, Truth};
 use crate::world::wind::Wind;
+use crate::world::wind::aloft::WindsAloft;
 use crate::world::{AscentTruth, Hanging};
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::{RigidState, upright};
@@ -15,13 +16,15 @@ use rand_chacha::ChaCha12Rng;
 use crate::dispersion::{Dispersion, Mismatch};
 
 /// The random differences of one flight.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
     /// The vehicle and the day.
     pub truth: Truth,
     /// The state in which the fall begins: at apogee, or when it is sensed after a drone's release.
     /// A flight from the pad rises to its own apogee.
     pub apogee: RigidState,
+    /// The mean wind over height, if it is measured.
+    pub winds_aloft: Option<WindsAloft>,
     /// The ascent of a flight from the pad.
     pub ascent: AscentTruth,
     /// How a vehicle hangs that starts below a drone.
@@ -54,6 +57,9 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let [calmest, windiest] = sigma.wind_m_s;
     truth.wind_m_s = calmest + (windiest - calmest) * chance.unit();
     truth.wind_towards_rad = TAU * chance.unit();
+    if let Some(winds) = &sigma.winds_aloft {
+        (truth.wind_m_s, truth.wind_towards_rad) = winds.near_ground();
+    }
 
     let start = &mission.start;
     let away_rad = TAU * chance.unit();
@@ -68,7 +74,7 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let roll_rad = TAU * chance.unit();
     let flight_seed = chance.random.next_u64();
 
-    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0);
+    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).with_aloft(sigma.winds_aloft.as_ref());
     let carried = wind.mean_m_s(height_m) * start.carried_share;
     // It leans in the direction of its motion; the roll angle is arbitrary.
     let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();
@@ -83,15 +89,15 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     // The booster's motor is of another lot.
     let ascent = ascended(mission, dispersion, seed, number);
     let hanging = hung(mission, dispersion, seed, number);
-    Draw { truth, apogee, ascent, hanging, flight_seed }
+    Draw { truth, apogee, winds_aloft: sigma.winds_aloft.clone(), ascent, hanging, flight_seed }
 }
 
 /// The set, which scatters landing motors as certified curves differ, with the scatter of the
 /// mission's lot, and a weighed vehicle. A value without scatter in the set is unchanged.
 fn narrowed_by_lot(mission: &Mission, set: &Dispersion) -> Dispersion {
-    let (Some(lot), Some(expected)) = (&mission.lot, &mission.expected) else { return *set };
+    let (Some(lot), Some(expected)) = (&mission.lot, &mission.expected) else { return set.clone() };
     let weighed = lot.weighed.vehicle_kg.map_or(set.mass_share, |_| set.mass_share.min(expected.mass_share));
-    let set = Dispersion { mass_share: weighed, ..*set };
+    let set = Dispersion { mass_share: weighed, ..set.clone() };
     if lot.burns == 0 {
         return set;
     }

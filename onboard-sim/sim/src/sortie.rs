@@ -180,7 +180,7 @@ impl Sortie {
             largest_errors: EstimatorErrors::default(),
             followed: None,
             mission: mission.clone(),
-            dispersion: *dispersion,
+            dispersion: dispersion.clone(),
             drawn,
         })
     }

@@ -188,14 +188,15 @@ pub(crate) fn world(mission: &Mission, drawn: &Draw) -> Result<World, SetUpError
 
 /// A world with the vehicle in a state.
 pub(crate) fn world_at(mission: &Mission, drawn: &Draw, state: &RigidState) -> Result<World, SetUpError> {
-    let Draw { truth, flight_seed, .. } = drawn;
+    let Draw { truth, winds_aloft, flight_seed, .. } = drawn;
     let curve = truth.curve(mission)?;
-    Ok(World::new(&mission.site, &mission.airframe, curve.as_ref(), truth, state, *flight_seed)?)
+    let world = World::new(&mission.site, &mission.airframe, curve.as_ref(), truth, state, *flight_seed)?;
+    Ok(world.with_winds_aloft(winds_aloft.as_ref()))
 }
 
 /// The draw with the state in which the fall begins.
 pub(crate) fn falling_as(mission: &Mission, drawn: &Draw) -> Result<Draw, SetUpError> {
-    Ok(Draw { apogee: falling(mission, drawn)?, ..*drawn })
+    Ok(Draw { apogee: falling(mission, drawn)?, ..drawn.clone() })
 }
 
 /// The state in which the fall begins.

@@ -10,6 +10,7 @@ mod sheet;
 use flight::vehicle::mission::StartPoint;
 use protocol::mission::MissionHash;
 use sim::recipe::{Recipe, RecipeError};
+use sim::world::wind::aloft::WindsAloft;
 
 pub use self::sheet::escaped;
 use crate::frame::{Frame, FrameError, changed};
@@ -76,6 +77,7 @@ impl Card {
         let calmest = days.first().ok_or(CardError::NoWind)?;
         refuse_without_a_landing(calmest, show)?;
         let impacts = hazard::studies(&days, flights, show)?;
+        let aloft = recipe.dispersion.winds_aloft.as_ref();
         let nominal = landed_as_planned(impacts.first().map_or(&[], Vec::as_slice));
         Ok(Self {
             recipe: recipe.clone(),
@@ -84,7 +86,7 @@ impl Card {
             masses: masses(calmest, nominal, flights.survey, show)?,
             flights,
             rule: Rule::of(&calmest.mission),
-            wind_from_deg,
+            wind_from_deg: wind_from_deg.or(aloft.map(WindsAloft::from_deg)),
         })
     }
 

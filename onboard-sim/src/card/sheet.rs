@@ -169,6 +169,7 @@ impl Card {
             ("no rail", if_so(launch.is_none())),
             ("name", Some(mission.name.clone())),
             ("site", Some(mission.site.to_string())),
+            ("wind", Some(self.recipe.dispersion.wind_over_height())),
             ("hash", Some(self.hash())),
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),

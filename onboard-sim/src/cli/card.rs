@@ -9,7 +9,7 @@ use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::hazard::Flights;
 use protocol::program::Exit;
 
-use super::{Selection, in_wind, on_threads, show_flights};
+use super::{Selection, in_winds, on_threads, show_flights};
 
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
@@ -19,7 +19,7 @@ pub(crate) struct CardArguments {
     #[command(flatten)]
     selection: Selection,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
-    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
+    #[arg(long = "wind", conflicts_with = "winds_file", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
     winds: Vec<f64>,
     /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up
     /// and the line downwind. By default downwind is up.
@@ -40,11 +40,7 @@ pub(crate) struct CardArguments {
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let recipe = arguments.selection.recipe(None)?;
-    let mut winds_m_s = arguments.winds.clone();
-    winds_m_s.sort_by(f64::total_cmp);
-    winds_m_s.dedup();
-    let winds = winds_m_s.into_iter().map(|wind_m_s| Ok((wind_m_s, in_wind(&recipe, wind_m_s)?)));
-    let winds = winds.collect::<anyhow::Result<Vec<_>>>()?;
+    let winds = in_winds(&recipe, &arguments.winds)?;
     let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
     let flights = Flights { survey, of_widest };
     let card = on_threads(arguments.selection.jobs, || {

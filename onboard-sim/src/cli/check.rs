@@ -10,7 +10,7 @@ use onboard_sim::check::{Candidate, Verdict, built_in, check};
 use protocol::program::{Exit, in_range};
 use serde::Deserialize;
 
-use super::{notify, on_threads, read, recipe, show_flights};
+use super::{WindsFile, notify, on_threads, read, recipe, show_flights};
 
 #[derive(Args)]
 pub(crate) struct CheckArguments {
@@ -28,6 +28,8 @@ pub(crate) struct CheckArguments {
     /// TOML file.
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
+    #[command(flatten)]
+    winds_aloft: WindsFile,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1, value_parser = in_range(0..=u64::MAX))]
     seed: u64,
@@ -38,6 +40,7 @@ pub(crate) struct CheckArguments {
 
 pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let recipe = recipe(&arguments.mission, None, &arguments.dispersion, arguments.seed)?;
+    let recipe = arguments.winds_aloft.applied(recipe)?;
     let mut motors = if arguments.from.is_empty() { built_in() } else { Vec::new() };
     arguments.from.iter().try_for_each(|path| read_motors(path, &mut motors))?;
     let (flights, show) = (arguments.flights, show_flights());

@@ -25,7 +25,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{in_wind, logging, notify, recipe};
+use super::{WindsFile, in_wind, logging, notify, recipe};
 
 #[derive(Args)]
 #[command(
@@ -88,8 +88,10 @@ pub(crate) struct FlyArguments {
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Mean wind 10 m above the ground, m/s, instead of the set's.
-    #[arg(long, value_name = "M_S")]
+    #[arg(long, value_name = "M_S", conflicts_with = "winds_file")]
     wind: Option<f64>,
+    #[command(flatten)]
+    winds_aloft: WindsFile,
     /// Break something; may be repeated.
     #[arg(long = "fault", value_name = "FAULT", long_help = format!("Break something; may be given more than once. Write {}", how_to_write()))]
     faults: Vec<TimedFault>,
@@ -126,7 +128,8 @@ pub(crate) fn run(arguments: FlyArguments) -> anyhow::Result<Exit> {
 impl FlyArguments {
     /// The flight that the options describe.
     fn flight(&self) -> anyhow::Result<RocketFlight> {
-        let mut recipe = recipe(&self.mission, self.start, &self.dispersion, self.seed)?;
+        let recipe = recipe(&self.mission, self.start, &self.dispersion, self.seed)?;
+        let mut recipe = self.winds_aloft.applied(recipe)?;
         if let Some(wind_m_s) = self.wind {
             recipe = in_wind(&recipe, wind_m_s)?;
         }

@@ -13,7 +13,7 @@ use protocol::program::Exit;
 use sim::dispersion::may_be_kinder;
 use sim::recipe::Recipe;
 
-use super::{Selection, in_wind, on_threads, show_flights};
+use super::{Selection, in_winds, on_threads, show_flights};
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
@@ -24,7 +24,7 @@ pub(crate) struct HazardArguments {
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Mean winds 10 m above the ground, m/s.
-    #[arg(long = "wind", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
+    #[arg(long = "wind", conflicts_with = "winds_file", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
     winds: Vec<f64>,
     /// Flights in each wind of every way, by which the ways are known that come down farthest.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
@@ -39,14 +39,15 @@ pub(crate) struct HazardArguments {
 }
 
 pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
-    let recipes = recipes(arguments)?;
-    let mission = &recipes[0].mission;
+    let (winds_m_s, recipes): (Vec<f64>, Vec<Recipe>) = recipes(arguments)?.into_iter().unzip();
+    let Some(Recipe { mission, dispersion, .. }) = recipes.first() else { anyhow::bail!("--wind is empty") };
     let cases = Case::of(mission);
     let flights = Flights { survey: arguments.flights, of_widest: arguments.hazard_flights };
     let impacts =
         on_threads(arguments.selection.jobs, || Ok(hazard::studies(&recipes, flights, &show_flights())?))?;
     let rule = Rule::of(mission);
-    let study = Study { arguments, mission, cases: &cases, impacts: &impacts };
+    let wind = dispersion.wind_over_height();
+    let study = Study { arguments, mission, cases: &cases, winds_m_s: &winds_m_s, wind, impacts: &impacts };
     study.write_text(&rule, &mut std::io::stdout().lock())?;
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
@@ -56,12 +57,12 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
 }
 
 /// The mission in each wind.
-fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<Recipe>> {
+fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<(f64, Recipe)>> {
     let mut recipe = arguments.selection.recipe(arguments.start)?;
     if arguments.start.is_none() && recipe.mission.launch.is_some() {
         recipe = recipe.starting_at(StartPoint::Pad)?;
     }
-    arguments.winds.iter().map(|wind_m_s| in_wind(&recipe, *wind_m_s)).collect()
+    in_winds(&recipe, &arguments.winds)
 }
 
 /// The flights with their arguments.
@@ -69,13 +70,17 @@ struct Study<'a> {
     arguments: &'a HazardArguments,
     mission: &'a Mission,
     cases: &'a [Case],
+    winds_m_s: &'a [f64],
+    /// The mean wind over height, in words.
+    wind: String,
     /// In each wind.
     impacts: &'a [Vec<Impact>],
 }
 
 impl Study<'_> {
     fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
-        let HazardArguments { selection: Selection { dispersion, seed, .. }, winds, .. } = self.arguments;
+        let HazardArguments { selection: Selection { dispersion, seed, .. }, .. } = self.arguments;
+        let (winds_m_s, wind) = (self.winds_m_s, &self.wind);
         let Mission { name, site, gate, .. } = self.mission;
         let start = match self.mission.start.at {
             StartPoint::Apogee => "apogee; how it got there is not in it",
@@ -83,7 +88,7 @@ impl Study<'_> {
         };
         writeln!(
             out,
-            "{name} from {start}: where it comes down, m from the pad. Simulated, not flown.\nSite: {site}."
+            "{name} from {start}: where it comes down, m from the pad. Simulated, not flown.\nSite: {site}.\nWind: {wind}."
         )?;
         writeln!(
             out,
@@ -94,24 +99,32 @@ impl Study<'_> {
         let of_each = |cell: &dyn Fn(&Vec<Impact>) -> String| {
             self.impacts.iter().map(|impacts| format!("{:<29}", cell(impacts))).collect::<Vec<_>>().concat()
         };
-        let heads = winds.iter().map(|wind_m_s| format!("{:<29}", format!("{wind_m_s} m/s")));
+        let heads = winds_m_s.iter().map(|wind_m_s| format!("{:<29}", format!("{wind_m_s} m/s")));
         writeln!(out, "{:<26}{}", "", heads.collect::<Vec<_>>().concat())?;
         for case in self.cases {
             let cells = of_each(&|impacts| cell(Radius::of_case(impacts, *case).as_ref()));
             writeln!(out, "{:<26}{cells}", case.name())?;
         }
+        let apogee = |impacts: &Vec<Impact>| {
+            let planned = impacts.iter().filter(|impact| impact.case == Case::AsPlanned);
+            let highest_m = planned.map(|impact| impact.course.highest_m);
+            let [low_m, high_m] = highest_m
+                .fold([f64::INFINITY, 0.0], |[low, high], m| [f64::min(low, m), f64::max(high, m)]);
+            format!("{low_m:.0} to {high_m:.0}")
+        };
         let landed = |impacts: &Vec<Impact>| {
             let Landings { stands, envelope, .. } = landed_as_planned(impacts);
             format!("{} of {}, {} inside", stands.count, stands.of, envelope.count)
         };
         writeln!(out, "\n{:<26}{}", "stand, inside the envelope", of_each(&landed))?;
+        writeln!(out, "{:<26}{}", "apogee, m", of_each(&apogee))?;
         writeln!(out, "\nRule   {rule}\n       ({})", Rule::SOURCE)?;
         writeln!(
             out,
             "Fence  {:.0} m: the vehicle lights its landing motor only inside; it holds nothing else back",
             gate.fence_radius_m
         )?;
-        for (wind_m_s, impacts) in winds.iter().zip(self.impacts) {
+        for (wind_m_s, impacts) in winds_m_s.iter().zip(self.impacts) {
             if let Some((case, radius)) = widest(impacts) {
                 let apart = keep_out_m(&radius, rule);
                 let end =
@@ -133,7 +146,7 @@ impl Study<'_> {
         let mut table = csv::Writer::from_writer(Vec::new());
         let columns = ["wind_m_s", "way", "flight", "x_m", "y_m", "downwind_m", "across_m"];
         table.write_record(columns.iter().chain(&Landing::COLUMNS))?;
-        for (wind_m_s, impacts) in self.arguments.winds.iter().zip(self.impacts) {
+        for (wind_m_s, impacts) in self.winds_m_s.iter().zip(self.impacts) {
             for impact in impacts {
                 let Impact { case, number, place_m, landing, .. } = impact;
                 let two =

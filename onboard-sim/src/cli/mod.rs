@@ -11,7 +11,7 @@ pub(crate) mod playback;
 mod single;
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
@@ -25,7 +25,29 @@ use protocol::log::writer::LogHeader;
 use protocol::program::{in_range, is_quiet};
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
+use sim::world::wind::aloft::WindsAloft;
 use toml_edit::{Array, DocumentMut};
+
+/// Winds over height.
+#[derive(Args)]
+pub(crate) struct WindsFile {
+    /// Mean wind over height instead of one 10 m above the ground: a table (CSV: height_m,
+    /// speed_m_s or speed_kn, from_deg), or a sounding of the University of Wyoming ("Text: List").
+    #[arg(long = "winds", value_name = "FILE")]
+    winds_file: Option<PathBuf>,
+}
+
+impl WindsFile {
+    /// The same flights in the winds of the file, if there is one. The log stores their text.
+    fn applied(&self, recipe: Recipe) -> anyhow::Result<Recipe> {
+        let Some(path) = &self.winds_file else { return Ok(recipe) };
+        let origin = path.display();
+        let levels = flight::vehicles::winds::read(&read(path)?).with_context(|| format!("{origin}"))?;
+        WindsAloft::try_from(levels.clone()).with_context(|| format!("{origin}"))?;
+        let levels = levels.into_iter().map(|level| toml_edit::Value::from(Array::from_iter(level)));
+        with_set_value(&recipe, "winds_aloft", Array::from_iter(levels), &format!("the winds of {origin}"))
+    }
+}
 
 /// What flies, under what chance.
 #[derive(Args)]
@@ -37,6 +59,8 @@ pub(crate) struct Selection {
     /// TOML file.
     #[arg(long, default_value = dispersion::DEFAULT, value_name = "NAME|FILE")]
     dispersion: String,
+    #[command(flatten)]
+    winds_aloft: WindsFile,
     /// Seed of everything random.
     #[arg(long, default_value_t = 1, value_parser = in_range(0..=u64::MAX))]
     seed: u64,
@@ -47,7 +71,7 @@ pub(crate) struct Selection {
 
 impl Selection {
     fn recipe(&self, start: Option<StartPoint>) -> anyhow::Result<Recipe> {
-        recipe(&self.mission, start, &self.dispersion, self.seed)
+        self.winds_aloft.applied(recipe(&self.mission, start, &self.dispersion, self.seed)?)
     }
 }
 
@@ -98,10 +122,27 @@ fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -
 fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     const MOST_M_S: f64 = 30.0;
     anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");
+    with_set_value(recipe, "wind_m_s", Array::from_iter([wind_m_s; 2]), &format!("{wind_m_s} m/s of wind"))
+}
+
+/// The same flights in each mean wind 10 m above the ground, m/s, rising; in their winds aloft if
+/// they have any.
+fn in_winds(recipe: &Recipe, winds_m_s: &[f64]) -> anyhow::Result<Vec<(f64, Recipe)>> {
+    if let Some(winds) = &recipe.dispersion.winds_aloft {
+        return Ok(vec![((10.0 * winds.near_ground().0).round() / 10.0, recipe.clone())]);
+    }
+    let mut winds_m_s = winds_m_s.to_vec();
+    winds_m_s.sort_by(f64::total_cmp);
+    winds_m_s.dedup();
+    winds_m_s.into_iter().map(|wind_m_s| Ok((wind_m_s, in_wind(recipe, wind_m_s)?))).collect()
+}
+
+/// The same flights with another value of their set, described by `words`.
+fn with_set_value(recipe: &Recipe, key: &str, value: Array, words: &str) -> anyhow::Result<Recipe> {
     let mut text: DocumentMut = recipe.dispersion_toml.parse()?;
-    text["wind_m_s"] = toml_edit::value(Array::from_iter([wind_m_s; 2]));
+    text[key] = toml_edit::value(value);
     let dispersion_toml = text.to_string();
-    let dispersion_name = format!("{} with {wind_m_s} m/s of wind", recipe.dispersion_name);
+    let dispersion_name = format!("{} with {words}", recipe.dispersion_name);
     let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
 }

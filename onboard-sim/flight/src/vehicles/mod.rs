@@ -8,6 +8,7 @@
 //! * [`thrust_curve`]: motor files, RASP (`.eng`) and RockSim (`.rse`), and tables of a test stand.
 //! * [`openrocket`]: a vehicle as OpenRocket simulates it. [`table`]: tables whose columns say
 //!   their units.
+//! * [`winds`]: winds over height, as a table or a sounding.
 //! * [`file_error`]: why a mission cannot be used.
 
 pub mod file_error;
@@ -16,3 +17,4 @@ pub mod motors;
 pub mod openrocket;
 pub mod table;
 pub mod thrust_curve;
+pub mod winds;

@@ -10,15 +10,19 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+/// A nautical mile per hour, m/s.
+const KNOT_M_S: f64 = 1852.0 / 3600.0;
 /// Units by quantity, each with its factor to the SI unit, which is first.
 #[rustfmt::skip]
-const UNITS: [&[(&str, f64)]; 6] = [
+const UNITS: [&[(&str, f64)]; 7] = [
     &[("s", 1.0), ("ms", 1e-3), ("min", 60.0)],
     &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("in", 0.0254), ("ft", 0.3048)],
     &[("kg", 1.0), ("g", 1e-3), ("oz", 0.028_349_523_125), ("lb", 0.453_592_37)],
     &[("m2", 1.0), ("cm2", 1e-4), ("mm2", 1e-6), ("in2", 6.4516e-4), ("ft2", 0.092_903_04)],
     &[("kgm2", 1.0), ("kgcm2", 1e-4), ("ozin2", 1.828_997_85e-5), ("lbin2", 2.926_396_56e-4), ("lbft2", 0.042_140_110_1),
         ("lbffts2", 1.355_817_95)],
+    &[("m/s", 1.0), ("km/h", 1.0 / 3.6), ("kn", KNOT_M_S), ("kt", KNOT_M_S), ("kts", KNOT_M_S), ("knot", KNOT_M_S),
+        ("knots", KNOT_M_S), ("mph", 0.447_04)],
     &[("n", 1.0), ("kn", 1e3), ("lbf", 4.448_221_62), ("kgf", 9.806_65), ("gf", 9.806_65e-3)],
 ];
 
@@ -53,8 +57,8 @@ pub fn factor(si: &str, unit: &str) -> Result<f64, String> {
     if si == unit || si.is_empty() {
         return Ok(1.0);
     }
-    let available = UNITS.iter().find(|kind| kind[0].0 == si).copied().unwrap_or_default();
-    available.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor).ok_or_else(|| {
+    let available = UNITS.iter().find(|kind| plain(kind[0].0) == si).copied().unwrap_or_default();
+    available.iter().find(|(name, _)| plain(name) == unit).map(|(_, factor)| *factor).ok_or_else(|| {
         let names = available.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
         format!("{} is accepted", if names.is_empty() { si } else { format!("a unit of {names}") })
     })
@@ -119,7 +123,10 @@ fn named(field: &str) -> (String, &str) {
     let field = field.trim_matches(|letter: char| !letter.is_alphanumeric() && !matches!(letter, ')' | ']'));
     let (name, unit) = match field.strip_suffix([')', ']']) {
         Some(inside) => inside.rsplit_once(['(', '[']),
-        None => field.rsplit_once('_'),
+        None => match field.strip_suffix("_m_s") {
+            Some(name) => Some((name, "m/s")),
+            None => field.rsplit_once('_'),
+        },
     }
     .unwrap_or((field, ""));
     (name.trim().to_lowercase(), unit)

@@ -39,6 +39,7 @@ pub use hanging::Hanging;
 pub use motor::TrueBurn;
 pub use plant::{Actuators, World};
 pub use truth::{AscentTruth, Fault, Truth};
+pub use wind::Wind;
 
 /// Length of one step, s.
 pub const STEP_S: f64 = 1e-3;

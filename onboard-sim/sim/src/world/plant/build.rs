@@ -20,6 +20,7 @@ use crate::world::numbers;
 use crate::world::servo::{Linkage, Servo};
 use crate::world::truth::{AscentTruth, SHAPE_MOST, Truth};
 use crate::world::wind::Wind;
+use crate::world::wind::aloft::WindsAloft;
 
 /// Why no world can be built from the data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -117,6 +118,16 @@ impl World {
         };
         world.wind.step(initial.position_m.z, 0.0);
         Ok(world)
+    }
+
+    /// The same world with a mean wind from a table over height, if there is one.
+    #[must_use]
+    pub fn with_winds_aloft(mut self, winds: Option<&WindsAloft>) -> Self {
+        if winds.is_some() {
+            self.wind = self.wind.with_aloft(winds);
+            self.wind.step(self.state.position_m.z, 0.0);
+        }
+        self
     }
 
     /// The same world with the vehicle on its booster, at rest on the rail, whose foot is on the

@@ -495,6 +495,11 @@ impl World {
         [0, 1, 2, 3].map(|fin: usize| self.fins[fin].load_rad())
     }
 
+    /// The wind of the flight.
+    pub fn wind(&self) -> &Wind {
+        &self.wind
+    }
+
     /// Wind at the vehicle, gusts included, in the world, m/s.
     pub fn wind_m_s(&self) -> Vector3<f64> {
         self.wind.now_m_s()

@@ -2,12 +2,14 @@
 //!
 //! The mean follows the power law over flat open country with the exponent 1/7 (J. F. Manwell, J.
 //! G. McGowan and A. L. Rogers, Wind Energy Explained, 2nd edition, chapter 2), from its value 10 m
-//! above the ground. Gusts are those of [`gusts`].
+//! above the ground. [`aloft`] replaces it by a table. Gusts are those of [`gusts`].
 
+pub mod aloft;
 pub mod gusts;
 
 use nalgebra::Vector3;
 
+use aloft::WindsAloft;
 use gusts::Gusts;
 
 /// Reference height of the mean wind, m.
@@ -28,6 +30,9 @@ pub struct Wind {
     veer_rad_m: f64,
     along: Vector3<f64>,
     across: Vector3<f64>,
+    /// A measured profile instead of the power law, and the difference between the wind at the
+    /// reference height and it, m/s.
+    aloft: Option<(WindsAloft, Vector3<f64>)>,
     gusts: Gusts,
     now_m_s: Vector3<f64>,
 }
@@ -45,6 +50,7 @@ impl Wind {
             veer_rad_m: 0.0,
             along: Vector3::new(cos, sin, 0.0),
             across: Vector3::new(-sin, cos, 0.0),
+            aloft: None,
             gusts: Gusts::new(gust_scale * gust_wind_m_s, seed),
             now_m_s: Vector3::zeros(),
         }
@@ -57,14 +63,28 @@ impl Wind {
         Self { exponent, veer_rad_m, ..self }
     }
 
-    /// This wind with the mean and the gust intensity of another wind; the gusts themselves
+    /// This wind with another mean over height, if there is one. It is shifted so that the wind at
+    /// the reference height stays.
+    #[must_use]
+    pub fn with_aloft(self, aloft: Option<&WindsAloft>) -> Self {
+        let shift_m_s = |aloft: &WindsAloft| self.along * self.reference_m_s - aloft.at_m_s(REFERENCE_HEIGHT_M);
+        let aloft = aloft.map(|aloft| (aloft.clone(), shift_m_s(aloft)));
+        Self { aloft, ..self }
+    }
+
+    /// This wind with the mean at the reference height and the gust intensity of another wind; the gusts themselves
     /// continue.
     pub(crate) fn changed(&self, other: &Self) -> Self {
-        Self { gusts: self.gusts.as_strong_as(&other.gusts), now_m_s: self.now_m_s, ..other.clone() }
+        let gusts = self.gusts.as_strong_as(&other.gusts);
+        let aloft = self.aloft.as_ref().map(|(aloft, _)| aloft);
+        Self { gusts, now_m_s: self.now_m_s, ..other.clone() }.with_aloft(aloft)
     }
 
     /// Mean wind at a height above ground, in the world, m/s.
     pub fn mean_m_s(&self, height_m: f64) -> Vector3<f64> {
+        if let Some((aloft, shift_m_s)) = &self.aloft {
+            return aloft.at_m_s(height_m) + shift_m_s;
+        }
         let mean_m_s = mean_m_s(self.reference_m_s, self.exponent, height_m);
         if self.veer_rad_m == 0.0 {
             return self.along * mean_m_s;
