@@ -5,12 +5,18 @@ use std::path::Path;
 use e2e::{Program, Running, program};
 use flight::vehicles::mission::BUILTIN;
 
+#[path = "../onboard-sim/flight/tests/missions/mod.rs"]
+mod missions;
+
+use self::missions::TEST_MISSIONS;
+
 /// Flies a mission by itself, with telemetry without a receiver, and shows its log. Of the second
 /// seed, in which all stand.
-fn shown(folder: &Path, mission: &str) {
-    let log = format!("{mission}.mcap");
+fn shown(folder: &Path, mission: &str, text: &str) {
+    let (log, file) = (format!("{mission}.mcap"), format!("{mission}.toml"));
+    std::fs::write(folder.join(&file), text).unwrap();
     let mut fly = program(Program::OnboardSim);
-    fly.args(["fly", "--mission", mission, "--seed", "2", "--auto", "--speed", "max"]);
+    fly.args(["fly", "--mission", &file, "--seed", "2", "--auto", "--speed", "max"]);
     fly.args(["--mavlink", "udpout:127.0.0.1:9"]);
     let flown = Running::to_end(fly.args(["--log", &log]).current_dir(folder));
     assert_eq!(flown.code, Some(0), "{mission}: {}", flown.output);
@@ -30,8 +36,8 @@ fn shown(folder: &Path, mission: &str) {
 fn the_ground_station_shows_a_flight_of_every_mission() {
     let folder = tempfile::tempdir().unwrap();
     std::thread::scope(|scope| {
-        for (mission, _) in BUILTIN {
-            scope.spawn(|| shown(folder.path(), mission));
+        for (mission, text) in BUILTIN.iter().chain(&TEST_MISSIONS) {
+            scope.spawn(|| shown(folder.path(), mission, text));
         }
     });
 }

@@ -9,8 +9,12 @@
 use flight::rules::phase::Phase;
 use flight::vehicle::mission::StartPoint;
 use onboard_sim::run::in_parallel;
+use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+
+#[path = "../flight/tests/missions/mod.rs"]
+mod missions;
 
 const SEED: u64 = 3001;
 const FLIGHTS: u64 = 200;
@@ -41,7 +45,10 @@ fn main() {
             continue;
         }
         for set in ["field", "real", "wild"] {
-            let recipe = Recipe::built_in(mission, set).unwrap().starting_at(start).unwrap();
+            let mut missions = flight::vehicles::mission::BUILTIN.iter().chain(&missions::TEST_MISSIONS);
+            let texts = *missions.find(|(name, _)| *name == mission).unwrap();
+            let set_texts = (set, Dispersion::builtin_toml(set).unwrap());
+            let recipe = Recipe::from_texts(texts, set_texts).unwrap().starting_at(start).unwrap();
             let mut recipe = Recipe { seed: SEED, ..recipe };
             recipe.mission.powered.max_passes =
                 bound.map_or(recipe.mission.powered.max_passes, |bound| Some(bound as usize));

@@ -124,7 +124,7 @@ pub fn changed(recipe: &Recipe, motor: &str, mass: &Mass) -> Result<Recipe, Fram
         // It follows from the motor's length.
         take(airframe.get_mut("mass"), "propellant_station_m");
         text.remove("lot");
-        text.remove("other_motors");
+        text.remove("other_motor");
     }
     Ok(recipe.clone().with_mission(text.to_string())?)
 }
@@ -226,7 +226,7 @@ mod tests {
     /// With the flown motor a mission retains the lot's measurements, but not the weight of another
     /// ballast; with another motor neither.
     #[test]
-    fn a_lot_and_the_other_motors_of_its_name_stay_with_a_motor() {
+    fn a_lot_and_the_other_motor_of_its_name_stay_with_a_motor() {
         let lot = "name = \"2609\"\nburns = 3\nimpulse = { mean = 1.02 }\nweighed = { vehicle_kg = 3.65 }";
         let recipe = recipe("mk3", &format!("\n[lot]\n{lot}\n"));
         let mass = Mass { loaded_kg: 3.75, ..recipe.mission.airframe.mass };
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!((&same.motor_curve, same.airframe.mass), (&recipe.mission.motor_curve, mass));
         let other = read("G33");
         assert!(other.lot.is_none() && other.motor_burns() == 0);
-        assert!(same.other_motors == ["H45W"] && other.other_curves.is_empty());
+        assert!(same.other_motor.as_deref() == Some("H45W") && other.other_curve.is_none());
         assert_eq!(other.motor_curve, flight::vehicles::motors::named("G33").unwrap());
     }
 

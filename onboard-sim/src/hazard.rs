@@ -652,6 +652,6 @@ mod tests {
         assert_eq!((Rule::of(&mk2).feet, Rule::of(&mk2).complex), (100.0, false));
         mk2.start.at = StartPoint::Pad;
         assert_eq!((Rule::of(&mk2).feet, Rule::of(&mk2).complex), (200.0, true));
-        assert_eq!((Rule::of(&of("mini-f10")).feet, Rule::of(&of("mini-f10")).model), (30.0, true));
+        assert_eq!((Rule::of(&of("vlr")).feet, Rule::of(&of("vlr")).model), (30.0, true));
     }
 }

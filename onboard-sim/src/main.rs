@@ -60,7 +60,7 @@ enum Command {
     /// officer, its back for whoever prepares the vehicle) and mission.toml (the mission that was
     /// given, byte for byte). In each wind every way in which a flight can end is flown 100 times,
     /// and the farthest ones 400 times: some minutes.
-    #[command(after_help = "Example: onboard-sim card --mission mini-f10 --wind-from 270 --out card")]
+    #[command(after_help = "Example: onboard-sim card --mission vlr --wind-from 270 --out card")]
     Card(cli::card::CardArguments),
     /// Show where a vehicle comes down, in each way that a flight can end: how near people may
     /// stand.

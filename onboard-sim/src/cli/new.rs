@@ -240,8 +240,8 @@ impl Draft {
         };
         self.motor = curve;
         self.put(MOTOR, Value::String(text), motor);
-        // Alternative curves of this motor are not available.
-        self.stated.remove("other_motors");
+        // The alternative curve of this motor is not available.
+        self.stated.remove("other_motor");
         Ok(())
     }
 
@@ -470,7 +470,7 @@ mod tests {
         assert!((ours.airframe.body.diameter_m - 0.074).abs() < 1e-4);
         assert_eq!(ours.motor_curve.name(), "club_38");
         assert!((ours.motor_curve.total_impulse_n_s() - 330.0).abs() < 1.0);
-        assert!(ours.changed.is_empty() && ours.other_motors.is_empty());
+        assert!(ours.changed.is_empty() && ours.other_motor.is_none());
         assert!(text.contains(&format!("(kg; {sim})\nloaded_kg = 3.5\n")), "{text}");
         // A motor that is too long for mk3's gimbal swings less.
         let long = ["--length", "0.72", "--motor-data", "club", "38", "260", "0.19", "0.37"];

@@ -219,8 +219,8 @@ fn card_of(recipe: &Recipe, flights: Flights) -> Card {
 
 #[test]
 fn a_card_is_of_the_mission_that_was_given_byte_for_byte() {
-    for (name, text) in flight::vehicles::mission::BUILTIN {
-        let recipe = Recipe::built_in(name, "field").unwrap();
+    for (name, text) in flight::vehicles::mission::BUILTIN.iter().chain(&crate::missions::TEST_MISSIONS) {
+        let recipe = crate::recipe_of(name, "field");
         let card = card_of(&recipe, Flights { survey: 1, of_widest: 1 });
         assert_eq!(card.recipe.mission_toml, *text, "{name}");
         let sheet = card.text();
@@ -235,7 +235,7 @@ fn a_card_is_of_the_mission_that_was_given_byte_for_byte() {
 
 #[test]
 fn a_card_lists_the_keys_that_differ_from_the_standard_controller() {
-    let mut recipe = Recipe::built_in("mini-f10", "none").unwrap();
+    let mut recipe = crate::recipe_of("mini-f10", "none");
     recipe.mission.changed = ["powered.weights.theta", "soft_tilt_deg"].map(str::to_owned).to_vec();
     let sheet = card_of(&recipe, Flights { survey: 1, of_widest: 1 }).text();
     let words = ["Controller", "not the standard one", "powered.weights.theta, soft_tilt_deg"];
@@ -308,7 +308,7 @@ fn a_parachute_ends_with_a_live_motor_and_often_on_its_side() {
 
 #[test]
 fn a_card_states_at_which_masses_nine_of_ten_land() {
-    let recipe = Recipe::built_in("mini-f10", "none").unwrap();
+    let recipe = crate::recipe_of("mini-f10", "none");
     let flights = Flights { survey: 4, of_widest: 4 };
     let masses = card_of(&recipe, flights).masses;
     assert!(masses.len() > 2 && masses.is_sorted_by(|a, b| a.0 < b.0), "{masses:?}");

@@ -4,9 +4,9 @@
 use onboard_sim::check::{Page, Verdict, built_in, check};
 use sim::recipe::Recipe;
 
-/// A built-in mission at another mass, kg.
+/// A mission at another mass, kg.
 fn recipe(name: &str, mass_kg: Option<f64>) -> Recipe {
-    let recipe = Recipe::built_in(name, "field").unwrap();
+    let recipe = crate::recipe_of(name, "field");
     let Some(mass_kg) = mass_kg else { return recipe };
     let own = format!("loaded_kg = {}", recipe.mission.airframe.mass.loaded_kg);
     assert!(recipe.mission_toml.contains(&own), "{own}");
@@ -23,8 +23,8 @@ fn page(recipe: &Recipe) -> Page {
 }
 
 #[test]
-fn no_built_in_mission_is_refused() {
-    for (name, _) in flight::vehicles::mission::BUILTIN {
+fn no_mission_is_refused() {
+    for (name, _) in flight::vehicles::mission::BUILTIN.iter().chain(&crate::missions::TEST_MISSIONS) {
         let page = page(&recipe(name, None));
         assert!(page.verdict() < Verdict::No, "{page}");
         assert!(page.rows.iter().all(|row| row.change.is_none() || row.verdict > Verdict::Ok), "{page}");

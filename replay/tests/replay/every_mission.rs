@@ -15,11 +15,13 @@ use replay::evaluate::evaluate;
 use replay::info::info;
 use replay::settings::Setting;
 use replay::verify::explain::explain;
+use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
 
 use crate::command_line::run;
 use crate::simulated::{Simulated, simulate_recipe, to_nobody};
 use crate::station::station_log;
+use crate::test_missions::TEST_MISSIONS;
 
 /// An exit code, and what the answer says; what begins with `!` is what it does not say.
 type Answer = (i32, &'static [&'static str]);
@@ -157,7 +159,7 @@ struct Case {
 impl Case {
     fn fly(mission: &'static str, start: StartPoint, fault: Option<&str>, ends: Ends) -> Self {
         let fly = |seed| {
-            let recipe = Recipe::built_in(mission, "field").unwrap().starting_at(start).unwrap();
+            let recipe = recipe(mission).starting_at(start).unwrap();
             let faults = fault.iter().map(|fault| fault.parse().unwrap()).collect();
             to_nobody(|link| simulate_recipe(Recipe { faults, seed, ..recipe }, &[link]))
         };
@@ -226,10 +228,17 @@ impl Case {
     }
 }
 
+/// A built-in mission, or one that only tests fly, in `field`.
+fn recipe(mission: &str) -> Recipe {
+    let mut missions = BUILTIN.iter().chain(&TEST_MISSIONS);
+    let mission = *missions.find(|(available, _)| *available == mission).unwrap();
+    Recipe::from_texts(mission, ("field", Dispersion::builtin_toml("field").unwrap())).unwrap()
+}
+
 /// A mission's flights from each of its starts. Those that are let go by a drone refuse to be
 /// dropped from where their apogee would be: it is too low for a plan.
 fn flights(mission: &'static str) -> Vec<Case> {
-    let recipe = Recipe::built_in(mission, "field").unwrap();
+    let recipe = recipe(mission);
     let own = recipe.mission.start.at;
     let starts = [StartPoint::Apogee, StartPoint::Pad, StartPoint::Drone];
     let has = starts.into_iter().filter(|start| recipe.clone().starting_at(*start).is_ok());
@@ -254,7 +263,7 @@ fn side_by_side<T: Send, R: Send>(
 
 #[test]
 fn every_command_answers_about_every_mission() {
-    let mut cases = side_by_side(BUILTIN, |(mission, _)| flights(mission));
+    let mut cases = side_by_side(BUILTIN.iter().chain(&TEST_MISSIONS), |(mission, _)| flights(mission));
     let faults = [("abort@3", Ends::Aborted), ("lidar-out@3", Ends::Landed)];
     cases.extend(faults.map(|(fault, ends)| Case::fly("mk3", StartPoint::Apogee, Some(fault), ends)));
     assert_eq!(cases.len(), 16, "7 from apogee, 2 from the pad, 5 below a drone, 2 with a fault");

@@ -49,4 +49,6 @@ mod station;
 mod strict;
 mod tables;
 mod tampered;
+#[path = "../../../onboard-sim/flight/tests/missions/mod.rs"]
+mod test_missions;
 mod what_if;

@@ -29,7 +29,7 @@ pub struct GateInput {
     /// The certified motor lands from here or from lower.
     pub lands_ahead: bool,
     /// Horizontal distance of the predicted touchdown under the motor from the pad, m.
-    pub predicted_touchdown_x_m: f64,
+    pub touchdown_distance_m: f64,
     /// All fins have reached their deployed angle.
     pub fins_confirmed: bool,
     /// The gyro shows the motor swing about both axes, or would show too little to decide.
@@ -93,7 +93,7 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
         condition("igniter continuity lost", input.igniter_continuity, true),
         condition("a fin does not follow", input.fins_confirmed, true),
         condition("the gimbal does not move", input.gimbal_moves, true),
-        value("touchdown beyond the fence", input.predicted_touchdown_x_m, limits.fence_radius_m, "m", 1.0),
+        value("touchdown beyond the fence", input.touchdown_distance_m, limits.fence_radius_m, "m", 1.0),
         condition("no landing ahead", input.lands_ahead, true),
         value("tilt", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg", FAR_BEYOND),
         value("pitch rate", rate_deg_s, limits.pitch_rate_max_deg_s, "deg/s", FAR_BEYOND),
@@ -128,7 +128,7 @@ mod tests {
             height_disagreement_m: 0.5,
             landing_feasible: true,
             lands_ahead: true,
-            predicted_touchdown_x_m: 0.3,
+            touchdown_distance_m: 0.3,
             fins_confirmed: true,
             gimbal_moves: true,
             parachute_stowed: true,
@@ -179,7 +179,7 @@ mod tests {
                 input.landing_feasible = false;
             }),
             ("touchdown beyond the fence", |input| {
-                input.predicted_touchdown_x_m = -121.0;
+                input.touchdown_distance_m = 121.0;
             }),
             ("a fin does not follow", |input| {
                 input.fins_confirmed = false;
@@ -218,7 +218,7 @@ mod tests {
             assert_eq!(shut[0].lasts, lasts);
             assert_eq!(shut[0].words(), format!("tilt {tilt_deg:.0} deg, limit 20"));
         }
-        let shut = shut_after(|input| input.predicted_touchdown_x_m = 131.0);
+        let shut = shut_after(|input| input.touchdown_distance_m = 131.0);
         assert!(shut[0].lasts);
         assert_eq!(shut[0].words(), "touchdown beyond the fence 131 m, limit 120");
         assert_eq!(shut_after(|input| input.lands_ahead = false)[0].words(), "no landing ahead");

@@ -523,12 +523,14 @@ fn validate(airframe: &Airframe) -> Result<(), BadValue> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vehicles::mission::test_missions::TEST_MISSIONS;
+    use crate::vehicles::mission::{BUILTIN, from_toml};
     use crate::vehicles::motors;
 
     #[test]
-    fn every_builtin_airframe_is_sound_and_has_its_motor() {
-        for (name, _) in crate::vehicles::mission::BUILTIN {
-            let airframe = crate::vehicles::mission::builtin_airframe(name).unwrap();
+    fn every_airframe_is_sound_and_has_its_motor() {
+        for (name, text) in BUILTIN.iter().chain(&TEST_MISSIONS) {
+            let airframe = from_toml(text, name).unwrap().airframe;
             let motor = motors::builtin(&airframe.motor).unwrap();
             let propellant_kg = motor.propellant_mass_kg();
             let model = MassModel::new(&airframe.mass, propellant_kg);
@@ -544,7 +546,8 @@ mod tests {
     /// The terminal speed with open fins is the landing paper's 39.4 m/s at 3 kg and sea level.
     #[test]
     fn val_landing_paper_terminal_speed_with_open_fins() {
-        let airframe = crate::vehicles::mission::builtin_airframe("mk2-h53").unwrap();
+        let (name, text) = TEST_MISSIONS[0];
+        let airframe = from_toml(text, name).unwrap().airframe;
         let area_m2 = airframe.drag_area_m2(core::f64::consts::FRAC_PI_2);
         let speed_m_s = (2.0 * airframe.mass.loaded_kg * 9.806_65 / (1.225 * area_m2)).sqrt();
         assert!((speed_m_s - 39.4).abs() < 0.05, "{speed_m_s}");

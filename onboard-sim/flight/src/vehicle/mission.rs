@@ -237,13 +237,12 @@ pub struct Mission {
     /// mission looks the motor up.
     #[serde(skip)]
     pub motor_curve: ThrustCurve,
-    /// Other motors that the landing motor may turn out to be in a simulation (`other_curve` of a
-    /// dispersion): names of built-in motors, or texts of motor files.
-    #[serde(default)]
-    pub other_motors: Vec<String>,
-    /// Their certified curves. The reader of the mission looks them up.
+    /// Motor that the landing motor may turn out to be in a simulation (`other_curve` of a
+    /// dispersion): name of a built-in motor, or text of a motor file.
+    pub other_motor: Option<String>,
+    /// Its certified curve. The reader of the mission looks it up.
     #[serde(skip)]
-    pub other_curves: Vec<ThrustCurve>,
+    pub other_curve: Option<ThrustCurve>,
     /// Measured burns of the motor's lot. The reader of the mission applies them to the motor's
     /// curve and prior, the ignition and the mass.
     pub lot: Option<Box<Lot>>,

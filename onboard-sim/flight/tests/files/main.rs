@@ -2,6 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 mod mission;
+#[path = "../missions/mod.rs"]
+mod missions;
 mod mk3_parts;
 mod motors;
 mod thrust_curve;

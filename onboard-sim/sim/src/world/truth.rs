@@ -129,8 +129,8 @@ impl Truth {
         if share == 0.0 {
             return Ok(Cow::Borrowed(&mission.motor_curve));
         }
-        let Some(other) = mission.other_curves.last() else {
-            return refuse("0 (the mission has no other_motors)");
+        let Some(other) = &mission.other_curve else {
+            return refuse("0 (the mission has no other_motor)");
         };
         if !(0.0..=1.0).contains(&share) {
             return refuse("0 to 1");

@@ -170,7 +170,7 @@ impl Pilot {
             // source.
             height_disagreement_m: estimate.heights.contradiction_m().unwrap_or(0.0),
             landing_feasible: self.prediction.ignition.band.is_some_and(|band| band.contains(onset_m)),
-            predicted_touchdown_x_m: self.prediction.touchdown_distance_m
+            touchdown_distance_m: self.prediction.touchdown_distance_m
                 + PLACE_SIGMAS * estimate.sigmas.position_m.xy().max(),
             fins_confirmed: self.fins_there(&input.fins_rad) && !self.fin_watch.any_stuck(),
             gimbal_moves: !self.swing_watch.found_stuck(),

@@ -28,12 +28,12 @@ use super::motors::{self, MotorError};
 pub const BUILTIN: &[(&str, &str)] = &[
     ("mk2", include_str!("../../../vehicles/missions/mk2.toml")),
     ("mk3", include_str!("../../../vehicles/missions/mk3.toml")),
-    ("mk2-h53", include_str!("../../../vehicles/missions/mk2-h53.toml")),
-    ("mini-f10", include_str!("../../../vehicles/missions/mini-f10.toml")),
     ("vlr", include_str!("../../../vehicles/missions/vlr.toml")),
-    ("vlr-f15", include_str!("../../../vehicles/missions/vlr-f15.toml")),
-    ("vlr-f16", include_str!("../../../vehicles/missions/vlr-f16.toml")),
 ];
+
+#[cfg(test)]
+#[path = "../../../tests/missions/mod.rs"]
+pub(crate) mod test_missions;
 
 /// The default built-in mission: the vehicle that a club should build.
 pub const DEFAULT: &str = "mk3";
@@ -106,9 +106,7 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     formulas.controller(&mut mission);
     mission.changed = formulas.changed;
     validate::numbers(&mission, &|_| true).map_err(bad_value)?;
-    for other in &mission.other_motors {
-        mission.other_curves.push(motors::named(other)?);
-    }
+    mission.other_curve = mission.other_motor.as_deref().map(motors::named).transpose()?;
     Ok(mission)
 }
 

@@ -59,8 +59,8 @@ impl Vehicle {
     /// # Errors
     /// A built-in file is missing: a defect of the build.
     pub(crate) fn new() -> Result<Self, PaperError> {
-        let mut airframe =
-            flight::vehicles::mission::builtin_airframe("mk2-h53").ok_or(PaperError::Airframe("mk2-h53"))?;
+        let text = include_str!("../../../../flight/tests/missions/mk2-h53.toml");
+        let mut airframe = flight::vehicles::mission::from_toml(text, "mk2-h53")?.airframe;
         airframe.mass.loaded_kg = 3.0;
         airframe.mass.loaded_cg_station_m = CG_STATION_M;
         airframe.mass.loaded_pitch_inertia_kg_m2 = 0.12;

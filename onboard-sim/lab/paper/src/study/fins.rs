@@ -12,6 +12,7 @@ use flight::rules::phase::Phase;
 use flight::vehicle::fins::{FinModel, ROLL};
 use nalgebra::Vector3;
 use onboard_sim::run::in_parallel;
+use onboard_sim::statistics::{quantile, sorted};
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::world::World;
@@ -144,13 +145,10 @@ fn fall(recipe: &Recipe, number: u64) -> Result<Vec<Instant>, PaperError> {
     Ok(fall)
 }
 
-/// Median and 95 % of a value.
+/// Median and 95 % of a value; NaN without samples.
 fn quantiles(samples: &[Instant], of: impl Fn(&Instant) -> f64) -> [f64; 2] {
-    let mut values: Vec<f64> = samples.iter().map(of).collect();
-    values.sort_by(f64::total_cmp);
-    let at =
-        |share: f64| values.get((share * (values.len() - 1) as f64) as usize).copied().unwrap_or(f64::NAN);
-    if values.is_empty() { [f64::NAN; 2] } else { [at(0.5), at(0.95)] }
+    let values = sorted(samples.iter().map(of));
+    [0.5, 0.95].map(|share| quantile(&values, share).unwrap_or(f64::NAN))
 }
 
 /// A value of an instant.

@@ -109,9 +109,8 @@ pub(crate) fn experiments() -> Experiments {
 /// Why an experiment cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum PaperError {
-    /// No built-in mission has this name.
-    #[error("no mission is named {0}")]
-    Airframe(&'static str),
+    #[error(transparent)]
+    Mission(#[from] flight::vehicles::mission::MissionError),
     #[error(transparent)]
     Motor(#[from] MotorError),
     /// The vehicle's data are refused: a defect of the build.

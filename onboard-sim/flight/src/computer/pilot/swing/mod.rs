@@ -129,10 +129,13 @@ mod tests {
     use super::reaction::Reaction;
     use super::*;
     use crate::vehicle::airframe::MassModel;
-    use crate::vehicles::mission::builtin;
+    use crate::vehicles::mission::test_missions::TEST_MISSIONS;
+    use crate::vehicles::mission::{BUILTIN, from_toml};
 
     fn swing_of(name: &str) -> (Mission, Option<Swing>) {
-        let mission = builtin(name).unwrap().unwrap();
+        let mut missions = BUILTIN.iter().chain(&TEST_MISSIONS);
+        let (_, text) = missions.find(|(available, _)| *available == name).unwrap();
+        let mission = from_toml(text, name).unwrap();
         let mass = MassModel::new(&mission.airframe.mass, mission.motor_curve.propellant_mass_kg()).at(0.0);
         let swing = Swing::of(&mission, &mass);
         (mission, swing)

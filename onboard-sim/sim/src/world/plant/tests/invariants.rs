@@ -149,7 +149,7 @@ fn data_out_of_range_are_refused() {
     assert_eq!(refuse(&truth, &start), "truth.cg_offset_m is 5; -0.1 to 0.1 is accepted");
     let [mk2, mk3] = ["mk2", "mk3"].map(|name| flight::vehicles::mission::builtin(name).unwrap().unwrap());
     for (mission, other_curve, required) in
-        [(&mk2, 0.5, "0 (the mission has no other_motors)"), (&mk3, 1.5, "0 to 1")]
+        [(&mk2, 0.5, "0 (the mission has no other_motor)"), (&mk3, 1.5, "0 to 1")]
     {
         let refused = Truth { other_curve, ..Truth::default() }.curve(mission).unwrap_err().to_string();
         assert_eq!(refused, format!("truth.other_curve is {other_curve}; {required} is accepted"));

@@ -3,19 +3,23 @@ mod invariants;
 mod landing;
 mod legs;
 mod mismatch;
+#[path = "../../../../../flight/tests/missions/mod.rs"]
+mod missions;
 
 use core::f64::consts::FRAC_PI_2;
 
-use flight::vehicles::motors;
+use flight::vehicles::{mission, motors};
 use nalgebra::UnitQuaternion;
 
 use super::*;
 
 const OPEN: Actuators = Actuators { gimbal_rad: [0.0; 2], fins_rad: [FRAC_PI_2; 4], ..Actuators::NONE };
 
-/// A built-in airframe on four springs without a block that gives way.
+/// A mission's airframe on four springs without a block that gives way.
 fn on_springs(name: &str) -> Airframe {
-    let mut airframe = flight::vehicles::mission::builtin_airframe(name).unwrap();
+    let mut missions = mission::BUILTIN.iter().chain(&missions::TEST_MISSIONS);
+    let (_, text) = missions.find(|(available, _)| *available == name).unwrap();
+    let mut airframe = mission::from_toml(text, name).unwrap().airframe;
     let legs = &mut airframe.legs;
     (legs.foot_station_m, legs.stiffness_n_m, legs.damping_n_s_m, legs.crush) = (-0.06, 2_000.0, 45.0, None);
     airframe
