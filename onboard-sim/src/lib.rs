@@ -8,6 +8,7 @@
 //! * [`statistics`], [`summary`]: percentiles and texts from the rows.
 //! * [`hazard`]: impact areas for each case of a flight.
 //! * [`check`]: prediction for an unbuilt vehicle whether it will land, and what to change.
+//! * [`drawing`]: a vehicle to scale, and the parts that overlap.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.
@@ -17,6 +18,7 @@
 
 pub mod card;
 pub mod check;
+pub mod drawing;
 pub mod files;
 pub mod frame;
 pub mod hazard;

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, ensure};
 use clap::Args;
+use flight::vehicle::mission::Mission;
 use flight::vehicles::thrust_curve;
 use onboard_sim::check::{Candidate, Verdict, built_in, check};
+use onboard_sim::drawing::{self, Drawing, MK3};
 use protocol::program::{Exit, in_range};
 use serde::Deserialize;
 
@@ -36,6 +38,12 @@ pub(crate) struct CheckArguments {
     /// Flights at the same time; the results do not depend on it.
     #[arg(long, value_name = "N", value_parser = in_range(1..=usize::MAX))]
     jobs: Option<usize>,
+    /// Draw the vehicle to scale into this file, and name the parts that overlap.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Parts to draw, CSV. Without a list mk3's own are drawn in mk3, and the mission's in others.
+    #[arg(long, value_name = "FILE", requires = "svg")]
+    parts: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
@@ -47,7 +55,24 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let progress = |done| show(done, flights as usize);
     let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &progress)?))?;
     write!(std::io::stdout().lock(), "{page}")?;
-    Ok(Exit::of(page.verdict() != Verdict::No))
+    let fits = arguments.svg.as_deref().map_or(Ok(true), |file| draw(arguments, &recipe.mission, file))?;
+    Ok(Exit::of(fits && page.verdict() != Verdict::No))
+}
+
+/// Draws the vehicle; returns whether no two parts overlap.
+fn draw(arguments: &CheckArguments, mission: &Mission, file: &Path) -> anyhow::Result<bool> {
+    let list = match &arguments.parts {
+        Some(parts) => drawing::read(&read(parts)?).with_context(|| parts.display().to_string())?,
+        None if arguments.mission == "mk3" => drawing::read(MK3)?,
+        None => Vec::new(),
+    };
+    let drawing = Drawing::new(mission, list);
+    let overlaps = drawing.overlaps();
+    for [one, other] in &overlaps {
+        writeln!(std::io::stdout().lock(), "no    drawing    {one} and {other} overlap")?;
+    }
+    std::fs::write(file, drawing.svg().0).with_context(|| file.display().to_string())?;
+    Ok(overlaps.is_empty())
 }
 
 /// Reads a motor file, the files of a folder in the order of their names, or a list. Reports

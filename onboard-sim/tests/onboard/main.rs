@@ -9,6 +9,7 @@ mod command_campaign;
 mod command_card;
 mod command_fly_log;
 mod custom_vehicles;
+mod drawing;
 mod faults;
 mod findings;
 mod hazard;
