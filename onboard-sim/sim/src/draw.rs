@@ -334,7 +334,7 @@ mod tests {
     fn val_hand_ignition_delays_have_a_tail() {
         let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
         let plain = Dispersion::builtin("none").unwrap();
-        let tailed = Dispersion { mismatch: Mismatch { ignition_tail_s: 0.1, ..plain.mismatch }, ..plain };
+        let tailed = Dispersion { mismatch: Mismatch { ignition_tail_s: 0.1, ..plain.mismatch }, ..plain.clone() };
         let late = |over_s: f64| {
             (0..400)
                 .filter(|number| {
