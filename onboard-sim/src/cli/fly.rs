@@ -318,8 +318,9 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
             summary.solve_times.missed()
         )?;
     }
-    if let Some([median, p99, worst]) = summary.lateness.quantiles() {
-        writeln!(out, "frames began late by: median {median:?}, p99 {p99:?}, worst {worst:?}")?;
+    if let Some(quantiles) = summary.lateness.quantiles() {
+        let [median_ms, p99_ms, worst_ms] = quantiles.map(|late| 1e3 * late.as_secs_f64());
+        writeln!(out, "frames began late by: median {median_ms:.1} ms, p99 {p99_ms:.1} ms, worst {worst_ms:.1} ms")?;
     }
     let ending = summary.verdict.as_ref().and_then(|verdict| verdict.ending.as_deref());
     match (&summary.outcome, ending) {

@@ -1,8 +1,8 @@
 //! Detects a stuck gimbal in the fall, before ignition.
 //!
 //! The landing motor has some per cent of the body's inertia. When it swings, the body turns the
-//! other way ([`Airframe::swinging_kg_m2`]), and the gyro measures that independently of the servo
-//! feedback. So the gimbal swings to and fro from fin deployment to ignition, pitch and yaw
+//! other way ([`swinging_kg_m2`](crate::vehicle::airframe::Airframe::swinging_kg_m2)), and the gyro
+//! measures that independently of the servo feedback. So the gimbal swings to and fro from fin deployment to ignition, pitch and yaw
 //! alternately, and the gyro is compared with the expected rate.
 //!
 //! Aerodynamic and fin moments turn the body more, but more slowly. The signs of the swing's rate
