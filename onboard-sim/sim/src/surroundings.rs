@@ -105,7 +105,7 @@ impl Surroundings {
 
     /// Feedback and switches after the frame, without other inputs; `released`: contact counts.
     pub(crate) fn feedback(&mut self, released: bool) -> SensedInput {
-        let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
+        let (gimbal_rad, fins_rad) = if self.world.airframe().servos_report {
             (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
         } else {
             (self.actuators.gimbal_rad, self.actuators.fins_rad)
