@@ -97,7 +97,7 @@ fn the_death_of_the_station_that_armed_holds_whoever_else_has_its_ids() {
             assert_eq!(report(&mut second, |_| true).commands, 0, "it has not armed");
         }
         vehicle.signal(Signal::SIGTERM);
-        assert!(vehicle.wait().output.contains("nothing heard of 255/190 for 1 s"));
+        assert!(vehicle.wait().output.contains("nothing received from 255/190 for 1 s"));
     }
 }
 

@@ -70,7 +70,7 @@ fn a_silent_uplink_holds_the_countdown() {
             .ground
             .wait_for_status("a release", |status| status.phase as u32 > TdPhase::TD_PHASE_PAD_ARMED as u32);
         let output = flight.end();
-        for words in ["nothing heard of 255/190 for 1 s", "HOLD: no countdown"] {
+        for words in ["nothing received from 255/190 for 1 s", "HOLD: no countdown"] {
             assert_eq!(output.matches(words).count(), 1, "{words}: {output}");
         }
     }

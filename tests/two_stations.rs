@@ -146,7 +146,7 @@ fn the_command_is_taken_over_when_the_commanding_laptop_dies() {
     let mut launch = Launch::armed_by_bob_and_ann();
     launch.ann.wait_for("FLIGHT Bob commands");
     // While Bob's frames arrive, no one takes command from him.
-    launch.ann.type_until(b"CTAKE\r", "FLIGHT Bob (254/190) is heard");
+    launch.ann.type_until(b"CTAKE\r", "FLIGHT Bob (254/190) was received");
     launch.bob.signal(Signal::SIGKILL);
     launch.ann.type_until(b"CTAKE\r", "RANGE SAFETY Ann commands");
     assert!(shows(&launch.ann, " ARMED "), "the vehicle stays armed");

@@ -91,9 +91,9 @@ impl Surroundings {
 
     /// Advances the world by one frame and samples the sensors; `None` if they gave no sample.
     pub(crate) fn sample_sensors(&mut self) -> Option<Measurements> {
-        let mut measured = None;
-        for _ in 0..FRAME_MS {
-            self.world.step(&self.actuators);
+        let (mut measured, mut left) = (None, FRAME_MS as usize);
+        while left > 0 {
+            left -= self.world.stride(&self.actuators, left);
             measured = self.sensors.observe(&SensorTruth::of(&self.world)).or(measured);
         }
         let energised =
@@ -105,7 +105,7 @@ impl Surroundings {
 
     /// Feedback and switches after the frame, without other inputs; `released`: contact counts.
     pub(crate) fn feedback(&mut self, released: bool) -> SensedInput {
-        let (gimbal_rad, fins_rad) = if self.world.airframe().servos_tell {
+        let (gimbal_rad, fins_rad) = if self.world.airframe().servos_report {
             (self.world.gimbal_feedback_rad(), self.sensors.fins_rad(&self.world.fins_feedback_rad()))
         } else {
             (self.actuators.gimbal_rad, self.actuators.fins_rad)

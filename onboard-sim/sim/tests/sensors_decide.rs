@@ -47,8 +47,8 @@ fn a_flight_whose_sensors_stand_on_the_rail_is_never_detected() {
     assert!(flown.starts_with(&[Phase::Boost, Phase::Coast, Phase::Deploy]), "{flown:?}");
     let measured = Measurements { gnss: None, ..frames[0].0.measured };
     let stood = frames.iter().map(|&(sensed, ready)| (SensedInput { measured, ..sensed }, ready));
-    let told = phases(computer, stood);
-    assert!(!told.contains(&Phase::Coast) && !told.contains(&Phase::Deploy), "{told:?}");
+    let reported = phases(computer, stood);
+    assert!(!reported.contains(&Phase::Coast) && !reported.contains(&Phase::Deploy), "{reported:?}");
 }
 
 /// The crew searches at the estimated position.

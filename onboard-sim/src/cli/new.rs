@@ -267,9 +267,9 @@ impl Draft {
             let taken = match key.path {
                 _ if answer.is_empty() => return Ok(()),
                 MOTOR => self.motor(&answer, None, prompt),
-                START => Ok(Value::String(answer.to_lowercase())).map(|at| self.put(START, at, "told")),
+                START => Ok(Value::String(answer.to_lowercase())).map(|at| self.put(START, at, "stated")),
                 path => number(&answer, key.unit, self.scales()[0] * self.like.airframe.mass.loaded_kg)
-                    .map(|number| self.put(path, number, "told")),
+                    .map(|number| self.put(path, number, "stated")),
             };
             remark = match (taken.and_then(|()| self.refused(key)), expected.zip(number_of(self))) {
                 (Err(error), _) => {
@@ -433,7 +433,7 @@ mod tests {
         ] {
             assert!(shown.contains(&format!("{question}{answer}")), "{question}{answer}: {shown}");
         }
-        assert!(text.contains("kitchen scale (kg; told)\nloaded_kg = 4.1\n"), "{text}");
+        assert!(text.contains("kitchen scale (kg; stated)\nloaded_kg = 4.1\n"), "{text}");
         assert!(text.contains("(m; mk3's, scaled)\nstation_m = 0.72\n"), "{text}");
         assert_eq!(dialogue(&["ours"], "3.7\n").0.unwrap_err().to_string(), "no more answers");
     }

@@ -94,7 +94,7 @@ lidar_station_m = 0.0
 [airframe]
 motor = "{motor}"
 igniters = {igniters}
-servos_tell = true
+servos_report = true
 [airframe.mass]
 loaded_kg = {mass_kg}
 loaded_cg_station_m = {cg_m}

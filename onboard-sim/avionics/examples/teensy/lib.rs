@@ -147,7 +147,7 @@ pub struct Build {
 /// Why a board or a part of it does not start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Trouble {
-    #[error("airframe: servos_tell is true, and these servos tell nothing; false is accepted")]
+    #[error("airframe: servos_report is true, and these servos tell nothing; false is accepted")]
     ServosTell,
     #[error("body_from_imu mirrors its axes; three different ones of a right-handed set are accepted")]
     Mirrored,
@@ -194,7 +194,7 @@ pub fn start<W: Wiring>(
     delay: &mut impl DelayNs,
 ) -> Result<(Frames, TeensyBoard<W>), Trouble> {
     let mission = computer.pilot().mission();
-    if mission.airframe.servos_tell {
+    if mission.airframe.servos_report {
         return Err(Trouble::ServosTell);
     }
     let [x, y, z] = build.body_from_imu.map(|(axis, sign)| Vector3::ith(axis, sign));

@@ -211,7 +211,7 @@ fn recipe() -> Recipe {
 
 fn mission() -> Mission {
     let mut mission = recipe().mission;
-    mission.airframe.servos_tell = false;
+    mission.airframe.servos_report = false;
     mission.site = Site { altitude_m: PAD_M, temperature_c: Some(AIR_K - 273.15), ..mission.site };
     mission
 }
@@ -642,7 +642,7 @@ fn what_is_built_otherwise_does_not_start() {
         start(parts(&bench), build, computer, &mut Device { bench, which: 0 }).err()
     };
     assert_eq!(refused(&|_, _| ()), None);
-    assert_eq!(refused(&|mission, _| mission.airframe.servos_tell = true), Some(Trouble::ServosTell));
+    assert_eq!(refused(&|mission, _| mission.airframe.servos_report = true), Some(Trouble::ServosTell));
     assert_eq!(refused(&|_, build| build.body_from_imu[2].1 = 1.0), Some(Trouble::Mirrored));
 }
 

@@ -167,8 +167,8 @@ fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, check
 // dead-man confirmation is overdue.
 
 /// Silence of the commanding station after which an armed vehicle on its pad disarms itself, s: a
-/// crew that restarts its station needs some ten seconds, and nobody should stand beside an armed
-/// vehicle that nobody commands.
+/// crew that restarts its station needs some ten seconds, and no person should stand beside an armed
+/// vehicle without a commander.
 const ALONE_S: f64 = 60.0;
 
 /// Time after a disarm in which only the station that disarmed may arm, s: two operators may have
@@ -353,7 +353,7 @@ impl Computer {
             _ => {}
         }
         if let Some((Proposal { act, by, .. }, confirmed_by)) = agreed {
-            let words = format!("{}: asked by {by}, confirmed by {confirmed_by}", act.name());
+            let words = format!("{}: requested by {by}, confirmed by {confirmed_by}", act.name());
             self.table.report(Severity::Notice, words);
         }
     }
@@ -391,7 +391,7 @@ impl Computer {
         }
         let (old, new) = (named(before, before_by), named(station, request.by));
         if age_s <= UPLINK_PROVEN_S {
-            return self.deny(CrewCommand::TakeCommand, format!("{old} is heard, {age_s:.1} s ago"));
+            return self.deny(CrewCommand::TakeCommand, format!("{old} was received {age_s:.1} s ago"));
         }
         // One person cannot both command and give the dead-man confirmations.
         if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping, request.by)
@@ -408,7 +408,8 @@ impl Computer {
             let reason = format!("only {wanted} or RANGE SAFETY takes over from {old}");
             return self.deny(CrewCommand::TakeCommand, reason);
         }
-        let silence = if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "not heard".into() };
+        let silence =
+            if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "never received".into() };
         self.table.report(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
         Answer::ACCEPTED
     }
@@ -420,9 +421,10 @@ impl Computer {
         // NaN is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
         let held = if is_heard {
-            deaf && self.hold(HoldCause::StationDeaf, || format!("{station} hears nothing of this vehicle"))
+            deaf && self
+                .hold(HoldCause::StationDeaf, || format!("{station} receives nothing of this vehicle"))
         } else {
-            let why = || format!("nothing heard of {station} for {UPLINK_SILENT_S} s");
+            let why = || format!("nothing received from {station} for {UPLINK_SILENT_S} s");
             self.hold(HoldCause::UplinkSilent, why)
         };
         if held {
@@ -434,7 +436,7 @@ impl Computer {
         // NaN is no sign of life.
         let is_attended = age_s <= ALONE_S;
         if waits && !is_attended {
-            let words = format!("nothing heard of {station} for {ALONE_S} s: DISARMED");
+            let words = format!("nothing received from {station} for {ALONE_S} s: DISARMED");
             self.table.report(Severity::Critical, words);
             let _ = self.table.apply(Event::DisarmRequested { lifted_off: false });
         }
@@ -496,9 +498,15 @@ fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {
         NoAgreement::NothingToConfirm => {
             format!("no pending proposal to {} has that number", act.name())
         }
-        NoAgreement::SamePerson(proposal) => format!("{} asked: another role must confirm", proposal.by),
+        NoAgreement::SamePerson(proposal) => {
+            format!("{} requested it: another role must confirm", proposal.by)
+        }
         NoAgreement::SameRole(proposal) => {
-            format!("{} asked: another role than {} must confirm", proposal.by, proposal.by.role.name())
+            format!(
+                "{} requested it: another role than {} must confirm",
+                proposal.by,
+                proposal.by.role.name()
+            )
         }
     }
 }

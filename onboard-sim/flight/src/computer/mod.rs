@@ -180,7 +180,7 @@ impl Computer {
     /// Returns the input with modelled servo positions if the vehicle has no servo feedback.
     fn with_silent_servos<'a>(&mut self, input: &Input<'a>) -> Input<'a> {
         let airframe = &self.pilot.mission().airframe;
-        if airframe.servos_tell {
+        if airframe.servos_report {
             return *input;
         }
         let command_rad = surfaces_rad(self.commands.gimbal_rad, self.commands.fins_rad);
@@ -215,7 +215,8 @@ impl Computer {
         let fins = &airframe.fins;
         let opening_s = fins.servo.delay_s + (fins.open_rad() - fins.closed_rad()) / fins.servo.rate_rad_s();
         let stand_open = input.fins_rad.iter().all(|fin_rad| libm::sin(*fin_rad) >= HATCH_FREE_SINE);
-        airframe.servos_tell && stand_open || self.table.time_s - self.table.mode().entered_at_s >= opening_s
+        airframe.servos_report && stand_open
+            || self.table.time_s - self.table.mode().entered_at_s >= opening_s
     }
 
     /// Reports changes in the input: the pin, and a log that has stopped.

@@ -282,7 +282,7 @@ impl Computer {
             estimator_converged: stance.settled,
             hanging_m: stance.hanging_m,
             fins_answering: self.fins_answering,
-            seers: (!self.pilot.mission().airframe.servos_tell).then(|| self.pad_check.seers()),
+            seers: (!self.pilot.mission().airframe.servos_report).then(|| self.pad_check.seers()),
             igniter_continuity: self.input.igniter_continuity,
             log_running: self.input.log.running,
             log_space_bytes: self.input.log.space_bytes,

@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn in_a_million_random_sequences_no_igniter_is_on_after_an_abort_a_disarm_or_a_hold() {
         let mut random = ChaCha8Rng::seed_from_u64(48);
-        let (mut ended, mut lit_before, mut landings) = (0_u64, 0_u64, 0_u64);
+        let (mut ended, mut with_current, mut landings) = (0_u64, 0_u64, 0_u64);
         for _ in 0..1_000_000_u32 {
             let mut mode = Mode::power_up(0.0);
             for first in [Event::SelfTestPassed, Event::PinPulled] {
@@ -225,7 +225,7 @@ mod tests {
                 if accepted && stops {
                     stopped = true;
                     ended += 1;
-                    lit_before += u64::from(before.is_on(PyroOutput::AscentIgniter));
+                    with_current += u64::from(before.is_on(PyroOutput::AscentIgniter));
                 } else if accepted && matches!(requested, Event::StartRequested { .. } | Event::LiftOff) {
                     // An armed vehicle that lifts off by itself flies its mission.
                     stopped = false;
@@ -246,9 +246,9 @@ mod tests {
                 before = outputs;
             }
         }
-        let found = format!("{ended} ended, {lit_before} of them with current, {landings} landings");
+        let found = format!("{ended} ended, {with_current} of them with current, {landings} landings");
         assert!(
-            ended > 100_000 && lit_before > 1_000 && landings > 10,
+            ended > 100_000 && with_current > 1_000 && landings > 10,
             "the sequences test too little: {found}"
         );
     }

@@ -22,7 +22,7 @@ pub struct Airframe {
     pub igniters: u32,
     /// The servos report where they are. If not, people must have seen them move before the vehicle
     /// is armed.
-    pub servos_tell: bool,
+    pub servos_report: bool,
     /// Masses and their positions.
     pub mass: Mass,
     /// The fuselage.

@@ -167,6 +167,13 @@ impl Motor {
         rate * self.burn.thrust_n(curve_s)
     }
 
+    /// Mean thrust from a time on, over a length of time, s, by so many equal parts, N.
+    pub(crate) fn mean_thrust_n(&self, from_s: f64, over_s: f64, parts: usize) -> f64 {
+        let part_s = over_s / parts as f64;
+        let each_n = (0..parts).map(|part| self.thrust_n(from_s + part_s * (part as f64 + 0.5)));
+        each_n.sum::<f64>() / parts as f64
+    }
+
     /// A chuff and a slow rise burn the propellant later, without loss: the position of the burn on
     /// its curve, s, and its rate.
     fn on_the_curve(&self, burning_s: f64) -> (f64, f64) {

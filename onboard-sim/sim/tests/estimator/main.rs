@@ -89,12 +89,12 @@ fn the_estimate_is_accurate_enough_for_landing() {
 #[test]
 fn the_wind_is_estimated_at_ignition_despite_a_wrong_drag_coefficient() {
     let flights = &*HEALTHY;
-    let lit: Vec<&Frame> = flights
+    let burning: Vec<&Frame> = flights
         .iter()
         .map(|frames| frames.iter().find(|frame| frame.burning).expect("a frame with the motor burning"))
         .collect();
     for axis in 0..2 {
-        let error_m_s = rms(&lit, |frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]);
+        let error_m_s = rms(&burning, |frame| (frame.estimate.wind_m_s - frame.wind_m_s)[axis]);
         println!("wind at ignition: {error_m_s:.2} m/s");
         assert!(error_m_s < 0.4, "{error_m_s}");
     }
@@ -163,13 +163,13 @@ fn after_a_jump_of_the_inertial_unit_the_estimate_is_unhealthy_and_then_recovers
     ];
     for jump in jumps {
         let flights = &fly(50, jump);
-        let doubted = flights
+        let rejected = flights
             .iter()
             .filter(|frames| {
                 frames.iter().any(|frame| frame.estimate.health == Health::Unhealthy(HealthIssue::Surprised))
             })
             .count();
-        assert!(doubted >= 49, "doubted in {doubted} of 50");
+        assert!(rejected >= 49, "rejected in {rejected} of 50");
         let down = last(flights);
         println!("velocity {:.3} m/s, tilt {:.2} deg", velocity_rms_m_s(&down), tilt_rms_deg(&down));
         assert!(velocity_rms_m_s(&down) < 0.1, "{}", velocity_rms_m_s(&down));

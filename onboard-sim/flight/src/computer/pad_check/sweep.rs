@@ -115,7 +115,7 @@ impl Sweep {
     pub(super) fn new(airframe: &Airframe) -> Self {
         Self {
             reaches: Reach::of_each(airframe),
-            feedback: airframe.servos_tell,
+            feedback: airframe.servos_report,
             surface: 0,
             target: 0,
             frames: 0,

@@ -102,6 +102,7 @@ impl World {
                 .over_height(truth.wind_exponent, truth.wind_veer_rad_m),
             ground: Ground::new(airframe, truth.ground_rise),
             steps: 0,
+            strode: 1,
             state: *initial,
             burnt_kg: 0.0,
             mass: mass_model.at(0.0),

@@ -1,6 +1,7 @@
-//! All parts together, one millisecond at a time.
+//! All parts together, one millisecond at a time, or in the air five.
 //!
-//! In the air a step is one Runge-Kutta step; near the ground it is several. Within a step wind,
+//! In the air a step is one Runge-Kutta step; near the ground it is several. Far from the ground
+//! five steps are one (a stride), unless the error of that is too large. Within a step wind,
 //! servo angles and masses are constant (masses at mid-step), while thrust and air density follow
 //! time and height. The centre of gravity moves through the body while propellant burns; that
 //! relative motion (some mm/s) is neglected in the velocities. The exhaust takes angular momentum
@@ -32,9 +33,9 @@ use crate::world::{STEP_S, body};
 
 /// Below this clearance steps are divided, m. It is more than one step of fall at 40 m/s.
 const NEAR_M: f64 = 0.1;
-/// Steps for which the wind is held constant, in which a vehicle moves by 0.2 m; the shortest gusts
-/// are 3 m long.
-const WIND_STEPS: u64 = 5;
+/// Steps of a stride, for which the wind is held constant. A vehicle moves by 0.2 m in it; the
+/// shortest gusts are 3 m long.
+const STRIDE: usize = 5;
 /// The density is taken as linear within this distance, m: it is wrong by a part in 10^9.
 const AIR_M: f64 = 0.5;
 /// Number of parts of a step near the ground, the time resolution of the first contact.
@@ -93,6 +94,8 @@ pub struct World {
     air: AirHere,
     ground: Ground,
     steps: u64,
+    /// Steps of the last stride.
+    strode: usize,
     state: RigidState,
     /// Landing propellant burnt up to the middle of the last step, kg, and the remaining weight of
     /// the vehicle.
@@ -175,46 +178,100 @@ impl Loads for Acting<'_> {
     }
 }
 
+/// What acts on a vehicle that stands or slides. It hardly moves: within a step the load of air and
+/// thrust is constant.
+struct OnGround<'a> {
+    others: Load,
+    ground: &'a Ground,
+    cg_m: Vector3<f64>,
+}
+
+impl Loads for OnGround<'_> {
+    fn load(&self, state: &RigidState, world_from_body: &Rotation3<f64>) -> Load {
+        let mut load = self.others;
+        self.ground.add_load(&mut load, state, world_from_body, &self.cg_m);
+        load
+    }
+}
+
 impl World {
     /// One step of a millisecond.
     pub fn step(&mut self, actuators: &Actuators) {
-        let time_s = self.time_s();
-        self.command(actuators, time_s);
-        let wind_changes = self.steps.is_multiple_of(WIND_STEPS);
-        self.steps += 1;
-        if self.rest.is_some() {
-            return;
-        }
-        if let Some(hanging) = &self.hanging {
-            (self.state, self.specific_force_m_s2) = hanging.at(time_s + STEP_S);
-            self.angular_acceleration_rad_s2 = Vector3::zeros();
-            return;
-        }
-        let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
-        self.parachute.step(time_s, airspeed_m_s);
-        if wind_changes {
-            self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * WIND_STEPS as f64);
-        }
-        self.air.follow(&self.site, self.state.position_m.z);
-        self.burnt_kg = self.motor.burnt_kg(time_s + 0.5 * STEP_S);
-        self.mass = self.mass_model.at(self.burnt_kg * self.truth.mass_scale);
-        if let Some(stack) = self.stack.take() {
-            self.ride(*stack, time_s);
-            return;
-        }
-        self.turn_back();
-        let cg_m = self.cg_m();
-        if self.touchdown.is_some() || self.ground.clearance_m(&self.state, &cg_m) < NEAR_M {
-            self.move_near_ground(time_s);
-        } else {
-            self.move_by(time_s, STEP_S, false);
-        }
+        self.stride(actuators, 1);
     }
 
     /// Advances by several steps with the same commands.
     pub fn advance(&mut self, actuators: &Actuators, steps: usize) {
-        for _ in 0..steps {
-            self.step(actuators);
+        let mut left = steps;
+        while left > 0 {
+            left -= self.stride(actuators, left);
+        }
+    }
+
+    /// One step, or as many as a stride has where that is possible and not more than allowed.
+    /// Returns their number.
+    pub fn stride(&mut self, actuators: &Actuators, most: usize) -> usize {
+        let wind_changes = self.steps.is_multiple_of(STRIDE as u64);
+        self.strode = if most >= STRIDE && wind_changes && self.may_stride() { STRIDE } else { 1 };
+        let (from_s, over_s) = (self.time_s(), STEP_S * self.strode as f64);
+        let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
+        for step in 0..self.strode {
+            let time_s = self.time_s();
+            self.command(actuators, time_s);
+            self.steps += 1;
+            if self.rest.is_some() {
+                break;
+            }
+            if let Some(hanging) = &self.hanging {
+                (self.state, self.specific_force_m_s2) = hanging.at(time_s + STEP_S);
+                self.angular_acceleration_rad_s2 = Vector3::zeros();
+                break;
+            }
+            self.parachute.step(time_s, airspeed_m_s);
+            if step == 0 {
+                if wind_changes {
+                    self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * STRIDE as f64);
+                }
+                self.air.follow(&self.site, self.state.position_m.z);
+                self.burnt_kg = self.motor.burnt_kg(from_s + 0.5 * over_s);
+                self.mass = self.mass_model.at(self.burnt_kg * self.truth.mass_scale);
+            }
+            if self.stack.is_none() {
+                self.turn_back();
+            }
+            // Servo angles and open parachute of a stride are those in its middle.
+            if step == self.strode / 2 {
+                self.move_on(from_s, over_s);
+            }
+        }
+        self.strode
+    }
+
+    fn move_on(&mut self, from_s: f64, over_s: f64) {
+        if let Some(stack) = self.stack.take() {
+            self.ride(*stack, from_s, over_s, self.strode);
+            return;
+        }
+        let near = || self.ground.clearance_m(&self.state, &self.cg_m()) < NEAR_M;
+        if self.strode == 1 && (self.touchdown.is_some() || near()) {
+            self.move_near_ground(from_s);
+        } else {
+            self.move_by(from_s, over_s, self.strode);
+        }
+    }
+
+    /// Nothing but air is near for a stride, or the vehicle waits on its rail.
+    fn may_stride(&self) -> bool {
+        if self.rest.is_some() || self.hanging.is_some() || self.touchdown.is_some() {
+            return false;
+        }
+        let speed_m_s = self.state.velocity_m_s.norm_squared().sqrt();
+        let room_m = NEAR_M + 2.0 * STEP_S * STRIDE as f64 * speed_m_s;
+        let cg_m = self.cg_m();
+        match &self.stack {
+            Some(stack) if stack.on_rail() => speed_m_s == 0.0 && !stack.lights(),
+            Some(stack) => self.truth.over_ground_m(&stack.lower_end_m(&self.state, &cg_m)) > room_m,
+            None => self.ground.clearance_m(&self.state, &cg_m) > room_m,
         }
     }
 
@@ -312,13 +369,14 @@ impl World {
         Plume::new(&self.truth, thrust_n, pressure_pa * self.airframe.body.reference_area_m2)
     }
 
-    fn move_by(&mut self, from_s: f64, step_s: f64, near_ground: bool) {
+    /// Everything that acts in free flight.
+    fn acting(&self, from_s: f64, step_s: f64, parts: usize) -> Acting<'_> {
         let cg_m = self.cg_m();
         let [pitch_rad, yaw_rad] = [0, 1]
             .map(|axis: usize| self.gimbal_links[axis].rad() + self.truth.thrust_misalignment_rad[axis]);
         let ((sin_pitch, cos_pitch), (sin_yaw, cos_yaw)) = (libm::sincos(pitch_rad), libm::sincos(yaw_rad));
-        let thrust_n = self.motor.thrust_n(from_s + 0.5 * step_s);
-        let acting = Acting {
+        let thrust_n = self.motor.mean_thrust_n(from_s, step_s, parts);
+        Acting {
             shape: &self.shape,
             configuration: Configuration {
                 fin_sines: [0, 1, 2, 3].map(|fin: usize| libm::sin(self.fin_links[fin].rad())),
@@ -339,17 +397,27 @@ impl World {
             ) - cg_m,
             // The gas leaves at the nozzle, wherever the pivot is.
             jet_damping_m_s: self.motor.flow_kg_n_s() * (cg_m.x * cg_m.x + self.mass.pitch_inertia_slope_m2),
-            ground: near_ground.then_some(&self.ground),
-        };
-        let inertia = Inertia {
+            ground: None,
+        }
+    }
+
+    fn inertia(&self) -> Inertia {
+        Inertia {
             mass_kg: self.mass.mass_kg,
             across_kg_m2: [1.0 + self.truth.inertia_split, 1.0 - self.truth.inertia_split]
                 .map(|share| self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale * share),
             roll_kg_m2: self.mass.roll_inertia_kg_m2 * self.truth.inertia_scale,
             principal_rad: self.truth.principal_axis_rad,
-        };
-        let (state, specific_force_m_s2) =
-            body::rk4_step(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s);
+        }
+    }
+
+    fn move_by(&mut self, from_s: f64, step_s: f64, parts: usize) {
+        let (inertia, acting) = (self.inertia(), self.acting(from_s, step_s, parts));
+        let moved = body::rk4_divided(&self.state, &inertia, &acting, STANDARD_GRAVITY_M_S2, step_s, parts);
+        self.set_moved(moved, step_s);
+    }
+
+    fn set_moved(&mut self, (state, specific_force_m_s2): (RigidState, Vector3<f64>), step_s: f64) {
         self.angular_acceleration_rad_s2 = (state.rate_rad_s - self.state.rate_rad_s) / step_s;
         self.specific_force_m_s2 = specific_force_m_s2;
         self.state = state;
@@ -362,11 +430,23 @@ impl World {
             None => PARTS,
         };
         let part_s = STEP_S / parts as f64;
+        let inertia = self.inertia();
+        let others = self.touchdown.is_some().then(|| {
+            self.acting(from_s, STEP_S, 1).load(&self.state, &self.state.world_from_body.to_rotation_matrix())
+        });
         let (mut specific_force, mut angular_acceleration) = (Vector3::zeros(), Vector3::zeros());
         for part in 0..parts {
             let time_s = from_s + part_s * part as f64;
             let before = self.state;
-            self.move_by(time_s, part_s, true);
+            let ground = &self.ground;
+            let step = |acting: &dyn Loads| {
+                body::rk4_divided(&before, &inertia, acting, STANDARD_GRAVITY_M_S2, part_s, 1)
+            };
+            let moved = match others {
+                Some(others) => step(&OnGround { others, ground, cg_m: self.cg_m() }),
+                None => step(&Acting { ground: Some(ground), ..self.acting(time_s, part_s, 1) }),
+            };
+            self.set_moved(moved, part_s);
             specific_force += self.specific_force_m_s2;
             angular_acceleration += self.angular_acceleration_rad_s2;
             let contact = self.ground.contact(&self.state, &self.cg_m());
@@ -428,6 +508,11 @@ impl World {
         self.steps
     }
 
+    /// Steps from the last but one moment to this one.
+    pub fn strode(&self) -> usize {
+        self.strode
+    }
+
     /// The vehicle's state; its position is that of the centre of gravity.
     pub fn state(&self) -> &RigidState {
         &self.state
@@ -443,13 +528,13 @@ impl World {
         self.airframe.above_feet_m(self.cg_m().x)
     }
 
-    /// Mean specific force over the last step in body axes, m/s^2, as measured by an ideal
+    /// Mean specific force over the last stride in body axes, m/s^2, as measured by an ideal
     /// accelerometer at the centre of gravity.
     pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
         &self.specific_force_m_s2
     }
 
-    /// Mean angular acceleration over the last step in body axes, rad/s^2.
+    /// Mean angular acceleration over the last stride in body axes, rad/s^2.
     pub fn angular_acceleration_rad_s2(&self) -> &Vector3<f64> {
         &self.angular_acceleration_rad_s2
     }

@@ -12,11 +12,10 @@ use nalgebra::Vector3;
 
 use super::{Acting, World};
 use crate::world::aero::{Configuration, Flow, Load, Plume};
-use crate::world::body::{Inertia, Loads as _};
+use crate::world::body::{self, Inertia, Loads as _};
 use crate::world::ground::RestOutcome;
 use crate::world::motor::Motor;
 use crate::world::truth::{AscentTruth, Fault, Truth};
-use crate::world::{STEP_S, body};
 
 /// The state of another point of the body, at an offset in body axes, m.
 fn at_offset(state: &RigidState, offset_m: &Vector3<f64>) -> RigidState {
@@ -28,42 +27,48 @@ fn at_offset(state: &RigidState, offset_m: &Vector3<f64>) -> RigidState {
 }
 
 /// A step along the rail: the state afterwards and the specific force, body axes, m/s^2.
-fn guided(stack: &mut Stack, before: &RigidState, load: &Load, mass_kg: f64) -> (RigidState, Vector3<f64>) {
+fn guided(
+    stack: &mut Stack,
+    before: &RigidState,
+    load: &Load,
+    mass_kg: f64,
+    step_s: f64,
+) -> (RigidState, Vector3<f64>) {
     let along = before.nose_in_world();
     let pushed_m_s2 = load.force_n.x / mass_kg - STANDARD_GRAVITY_M_S2 * along.z;
     let speed_m_s = before.velocity_m_s.dot(&along);
-    let next_m_s = stack.slide(speed_m_s, pushed_m_s2, STEP_S);
+    let next_m_s = stack.slide(speed_m_s, pushed_m_s2, step_s);
     let after = RigidState {
-        position_m: before.position_m + along * (0.5 * (speed_m_s + next_m_s) * STEP_S),
+        position_m: before.position_m + along * (0.5 * (speed_m_s + next_m_s) * step_s),
         velocity_m_s: along * next_m_s,
         ..*before
     };
-    let acceleration_m_s2 = along * ((next_m_s - speed_m_s) / STEP_S);
+    let acceleration_m_s2 = along * ((next_m_s - speed_m_s) / step_s);
     let felt_m_s2 = acceleration_m_s2 + Vector3::z() * STANDARD_GRAVITY_M_S2;
     (after, before.world_from_body.inverse_transform_vector(&felt_m_s2))
 }
 
 impl World {
     /// One step with the booster. `stack` is taken out of the world.
-    pub(super) fn ride(&mut self, mut stack: Stack, time_s: f64) {
+    pub(super) fn ride(&mut self, mut stack: Stack, time_s: f64, step_s: f64, parts: usize) {
         let cg_m = self.cg_m();
-        let mass = stack.mass(&self.mass, &cg_m, time_s + 0.5 * STEP_S);
+        let mass = stack.mass(&self.mass, &cg_m, time_s + 0.5 * step_s);
         let from_stack_m = cg_m - mass.cg_m;
         let before = at_offset(&self.state, &-from_stack_m);
-        let acting = self.acting_on(&stack, &mass, time_s);
+        let acting = self.acting_on(&stack, &mass, stack.motor.mean_thrust_n(time_s, step_s, parts));
         let (after, felt_m_s2) = if stack.on_rail() {
             let load = acting.load(&before, &before.world_from_body.to_rotation_matrix());
-            guided(&mut stack, &before, &load, mass.inertia.mass_kg)
+            guided(&mut stack, &before, &load, mass.inertia.mass_kg, step_s)
         } else {
-            body::rk4_step(&before, &mass.inertia, &acting, STANDARD_GRAVITY_M_S2, STEP_S)
+            body::rk4_divided(&before, &mass.inertia, &acting, STANDARD_GRAVITY_M_S2, step_s, parts)
         };
-        self.angular_acceleration_rad_s2 = (after.rate_rad_s - before.rate_rad_s) / STEP_S;
+        self.angular_acceleration_rad_s2 = (after.rate_rad_s - before.rate_rad_s) / step_s;
         let rate = after.rate_rad_s;
         self.specific_force_m_s2 = felt_m_s2
             + self.angular_acceleration_rad_s2.cross(&from_stack_m)
             + rate.cross(&rate.cross(&from_stack_m));
         self.state = at_offset(&after, &from_stack_m);
-        let now_s = time_s + STEP_S;
+        let now_s = time_s + step_s;
         if !stack.on_rail() && self.truth.over_ground_m(&stack.lower_end_m(&self.state, &cg_m)) < 0.0 {
             self.touchdown = Some(self.touchdown_at(now_s, &self.state.clone()));
             self.come_to_rest(now_s, RestOutcome::BodyStrike);
@@ -75,7 +80,7 @@ impl World {
     }
 
     /// The forces of a step.
-    fn acting_on<'a>(&'a self, stack: &'a Stack, mass: &StackMass, time_s: f64) -> Acting<'a> {
+    fn acting_on<'a>(&'a self, stack: &'a Stack, mass: &StackMass, thrust_n: f64) -> Acting<'a> {
         let body = &self.airframe.body;
         let cg_m = mass.cg_m;
         Acting {
@@ -90,7 +95,7 @@ impl World {
             stack: Some((stack, body.reference_area_m2)),
             wind_m_s: self.wind.now_m_s(),
             air: self.air,
-            thrust_n: stack.thrust_n(time_s + 0.5 * STEP_S),
+            thrust_n,
             thrust_direction: Vector3::x(),
             thrust_place_m: stack.nozzle_m() - cg_m,
             jet_damping_m_s: stack.jet_damping_m_s(cg_m.x),
@@ -291,7 +296,7 @@ impl Stack {
     }
 
     /// Lowest point of the axis, world axes, m.
-    fn lower_end_m(&self, vehicle: &RigidState, vehicle_cg_m: &Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn lower_end_m(&self, vehicle: &RigidState, vehicle_cg_m: &Vector3<f64>) -> Vector3<f64> {
         vehicle.position_m + vehicle.world_from_body * (self.nozzle_m() - vehicle_cg_m)
     }
 }

@@ -64,16 +64,18 @@ impl Sensors {
 
     pub(super) fn watch_satellites(&mut self, truth: &SensorTruth, out: bool) {
         let gnss = &self.params.gnss;
-        if self.elapsed_ms % gnss.period_ms != self.gnss_phase_ms {
+        let ago_ms = (self.elapsed_ms + gnss.period_ms - self.gnss_phase_ms) % gnss.period_ms;
+        if ago_ms >= truth.since_ms {
             return;
         }
+        let now_ms = self.elapsed_ms - ago_ms;
         for axis in &mut self.wander {
             axis.advance(f64::from(gnss.period_ms) * MS_S, &mut self.gnss_noise);
         }
         let wandered_m = Vector3::from_fn(|axis, _| self.wander[axis].value) - self.zero_m;
         let white_m = Vector3::new(gnss.horizontal_white_m, gnss.horizontal_white_m, gnss.vertical_white_m);
         let (older_s, slow_m_s) = self.flaws.of_satellites(&self.params);
-        let mut then = moved_back(truth, older_s);
+        let mut then = moved_back(truth, older_s + f64::from(ago_ms) * MS_S);
         let lever_m = self.places.lever_arms(&truth.cg_m).gnss_m;
         then.velocity_m_s += then.world_from_body * then.rate_rad_s.cross(&lever_m);
         then.position_m += then.world_from_body * lever_m;
@@ -88,7 +90,7 @@ impl Sensors {
             velocity_m_s: then.velocity_m_s
                 + slow_m_s
                 + self.gnss_noise.next3() * (gnss.velocity_m_s * noise),
-            valid_at_s: self.start_s + f64::from(self.elapsed_ms) * MS_S + self.flaws.gnss_tag_s,
+            valid_at_s: self.start_s + f64::from(now_ms) * MS_S + self.flaws.gnss_tag_s,
             quality: FixQuality {
                 satellites: 9,
                 horizontal_m: gnss.horizontal_wander_m,
@@ -96,7 +98,7 @@ impl Sensors {
                 speed_m_s: gnss.velocity_m_s * noise,
             },
         };
-        let stale = self.stale.filter(|(_, until_ms)| self.elapsed_ms < *until_ms);
+        let stale = self.stale.filter(|(_, until_ms)| now_ms < *until_ms);
         if let Some((held, _)) = stale {
             fix.position_m = held.position_m + self.flaws.satellites.next3() * HELD_SPREAD;
             fix.velocity_m_s = held.velocity_m_s + self.flaws.satellites.next3() * HELD_SPREAD;
@@ -106,7 +108,7 @@ impl Sensors {
             fix.position_m += off_m;
         }
         if stale.is_some() || !out && fate != Fate::Lost {
-            self.on_its_way = Some((self.elapsed_ms + gnss.delay_ms, fix));
+            self.on_its_way = Some((now_ms + gnss.delay_ms, fix));
         }
     }
 

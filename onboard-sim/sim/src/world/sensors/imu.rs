@@ -54,9 +54,8 @@ flight::with_defaults! {
 impl Sensors {
     /// Specific force at the inertial unit: that of the centre of gravity, plus the effect of
     /// rotation (Stevens and Lewis, chapter 1).
-    pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
-        let (lever_m, rate) =
-            (self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m, &truth.state.rate_rad_s);
+    pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth, rate: &Vector3<f64>) -> Vector3<f64> {
+        let lever_m = self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m;
         truth.specific_force_m_s2
             + truth.angular_acceleration_rad_s2.cross(&lever_m)
             + rate.cross(&rate.cross(&lever_m))

@@ -41,11 +41,13 @@ pub const NEARLY_EXACT: f64 = 1e-3;
 /// loops follow 4 g) and finds them again this long after it, ms: a hot start takes 1 to 2 s.
 const REACQUIRED_MS: u32 = 1500;
 
-/// The truth that the sensors measure, after a millisecond.
+/// The truth that the sensors measure, after a millisecond or several.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensorTruth {
     /// Position, velocity, attitude and rotation; the position is the centre of gravity's.
     pub state: RigidState,
+    /// Time since the truth before, ms. Forces and angular acceleration are means over it.
+    pub since_ms: u32,
     /// Acceleration less gravity at the centre of gravity, body axes, m/s^2.
     pub specific_force_m_s2: Vector3<f64>,
     /// Speed through the air, m/s.
@@ -81,6 +83,7 @@ impl SensorTruth {
     ) -> Self {
         Self {
             state: *state,
+            since_ms: 1,
             specific_force_m_s2: *specific_force_m_s2,
             airspeed_m_s,
             airspeed_across_m_s: 0.0,
@@ -99,6 +102,7 @@ impl SensorTruth {
         let in_body = world.state().world_from_body.inverse_transform_vector(&world.air_velocity_m_s());
         Self {
             state: *world.state(),
+            since_ms: world.strode() as u32,
             airspeed_across_m_s: libm::hypot(in_body.y, in_body.z),
             specific_force_m_s2: *world.specific_force_m_s2(),
             airspeed_m_s: world.air_velocity_m_s().norm(),
@@ -223,12 +227,14 @@ impl Sensors {
         &self.errors
     }
 
-    /// Measures the truth after one more millisecond; returns a frame's measurements after every
+    /// Measures the truth after some more milliseconds; returns a frame's measurements after every
     /// fifth.
     pub fn observe(&mut self, truth: &SensorTruth) -> Option<Measurements> {
-        self.elapsed_ms += 1;
-        self.rate_sum_rad_s += truth.state.rate_rad_s;
-        self.force_sum_m_s2 += self.force_at_unit_m_s2(truth);
+        self.elapsed_ms += truth.since_ms;
+        let (milliseconds, back_s) = (f64::from(truth.since_ms), 0.5 * MS_S * f64::from(truth.since_ms - 1));
+        let rate_rad_s = truth.state.rate_rad_s - truth.angular_acceleration_rad_s2 * back_s;
+        self.rate_sum_rad_s += rate_rad_s * milliseconds;
+        self.force_sum_m_s2 += self.force_at_unit_m_s2(truth, &rate_rad_s) * milliseconds;
         if truth.boosted {
             if self.boosted_ms.is_none() && self.params.gnss.stale_s > 0.0 {
                 self.hold_fixes(&truth.state, self.params.gnss.stale_s);

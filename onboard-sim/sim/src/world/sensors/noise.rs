@@ -164,7 +164,7 @@ pub fn start_with_errors(truth: &RigidState, uncertainty: &StartUncertainty, see
 
 impl Sensors {
     /// The estimate of a vehicle that has levelled itself on its pad: the attitude is that of the
-    /// inertial unit, with its accelerometer's error at rest, and has the heading of `believed`.
+    /// inertial unit, with its accelerometer's error at rest, and has the heading of the estimate.
     pub(crate) fn levelled(&self, truth: &RigidState, estimate: &RigidState) -> RigidState {
         let unit_from_body = UnitQuaternion::from_rotation_matrix(&self.flaws.unit_from_body);
         let world_from_unit = truth.world_from_body * unit_from_body.inverse();

@@ -196,8 +196,8 @@ fn val_hand_an_offset_unit_senses_the_rotation_and_a_rotated_one_mixes_the_axes(
     truth.state.rate_rad_s = Vector3::new(0.0, 0.0, 2.0);
     truth.angular_acceleration_rad_s2 = Vector3::new(0.0, 0.0, 5.0);
     // Centripetal -w^2 r along x, tangential a r along y.
-    let felt = one_frame(&mut sensors, &truth).imu.specific_force_m_s2;
-    assert!((felt - Vector3::new(9.8 - 0.4, 0.1 + 0.5, -0.2)).norm() < 1e-12, "{felt}");
+    let measured = one_frame(&mut sensors, &truth).imu.specific_force_m_s2;
+    assert!((measured - Vector3::new(9.8 - 0.4, 0.1 + 0.5, -0.2)).norm() < 1e-12, "{measured}");
     let mut turned = flawed(&quiet());
     // The unit is turned by 90 degrees about x: its y axis lies along the body's z.
     turned.flaws.unit_from_body = nalgebra::Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
@@ -238,9 +238,9 @@ fn the_burning_motor_shifts_the_gyros_bias_by_the_stated_size() {
                 one_frame(&mut sensors, &SensorTruth { burning, ..falling(10.0, 50.0) }).imu.gyro_rad_s
             };
             assert!(gyro(false).norm() < 1e-12);
-            let [lit, later] = [gyro(true), gyro(true)];
-            assert_eq!(lit, later, "it stays");
-            lit.norm_squared() / 3.0
+            let [first, later] = [gyro(true), gyro(true)];
+            assert_eq!(first, later, "it stays");
+            first.norm_squared() / 3.0
         })
         .sum();
     // Four standard errors of 1,200 numbers are 8 %.

@@ -194,7 +194,7 @@ fn one_proposes_another_confirms_and_both_are_named() {
     assert_eq!((crew.people, crew.act, crew.asked_by), (2, TdAct::TD_ACT_ARM, 2));
     assert_eq!(crew.ask_number, FIRST_PROPOSAL + 1);
     for (station, reason) in [
-        (FLIGHT, "FLIGHT Bob asked: another role must confirm"),
+        (FLIGHT, "FLIGHT Bob requested it: another role must confirm"),
         (FLIGHT_TOO, "another role than FLIGHT must confirm"),
         (OBSERVER, "only an operator with a key of their own commands"),
     ] {
@@ -205,7 +205,7 @@ fn one_proposes_another_confirms_and_both_are_named() {
     assert!(!launch.armed());
     let (answer, words) = launch.confirms(RANGE, ARM);
     assert_eq!(answer, ACCEPTED);
-    assert!(words.contains("arm: asked by FLIGHT Bob, confirmed by RANGE SAFETY Ann"), "{words}");
+    assert!(words.contains("arm: requested by FLIGHT Bob, confirmed by RANGE SAFETY Ann"), "{words}");
     assert!(launch.armed());
     // The proposer is in command.
     let crew = launch.crew.clone().unwrap();

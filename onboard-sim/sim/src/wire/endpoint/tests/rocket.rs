@@ -131,8 +131,8 @@ fn in_the_descent_the_band_is_reported_four_times_a_second() {
     let mut airborne = Airborne::let_go("field");
     airborne.run_while(|rocket| rocket.phase() != Phase::LandArmed);
     let sent = airborne.run(2.0);
-    let told = count(&sent, TD_DESCENT_DATA::ID);
-    assert!((7..=9).contains(&told), "{told} in 2 s");
+    let reported = count(&sent, TD_DESCENT_DATA::ID);
+    assert!((7..=9).contains(&reported), "{reported} in 2 s");
     let last = decoded!(sent, TD_DESCENT).last();
     let last = last.unwrap();
     assert!(last.band_low_m < last.chosen_height_m && last.chosen_height_m < last.band_high_m, "{last:?}");
@@ -170,14 +170,20 @@ fn findings_are_reported() {
     let count = usize::from(after[0].1);
     // One a second, and those that waited for room in the second before.
     assert!((9..=12).contains(&after.len()), "{after:?}");
-    assert!((0..count).all(|place| after.iter().any(|told| usize::from(told.0) == place)), "{after:?}");
+    assert!(
+        (0..count).all(|place| after.iter().any(|reported| usize::from(reported.0) == place)),
+        "{after:?}"
+    );
 
     // Here are sensors that are nearly exact.
     let mut airborne = Airborne::let_go("none");
     let mut sent = airborne.run_while(|rocket| rocket.phase() != Phase::Touchdown);
     sent.extend(airborne.run(3.0));
-    let told = findings(&sent);
-    assert!(told.len() >= 3 && told.iter().all(|told| *told == (0, 0, String::new())), "{told:?}");
+    let reported = findings(&sent);
+    assert!(
+        reported.len() >= 3 && reported.iter().all(|reported| *reported == (0, 0, String::new())),
+        "{reported:?}"
+    );
 }
 
 #[test]
@@ -231,11 +237,11 @@ fn a_check_is_reported_value_by_value() {
     let mut places = std::collections::BTreeSet::new();
     let mut last = None;
     let sent = airborne.run(24.0);
-    for told in decoded!(sent, TD_PAD_CHECK) {
-        if told.found > 0 {
-            places.insert(told.place);
+    for reported in decoded!(sent, TD_PAD_CHECK) {
+        if reported.found > 0 {
+            places.insert(reported.place);
         }
-        last = Some(told);
+        last = Some(reported);
     }
     let last = last.unwrap();
     assert_eq!(last.state, TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);

@@ -185,7 +185,7 @@ fn a_station_without_a_downlink_in_the_countdown_holds_it() {
     }
     pad.run(0.5);
     assert_eq!(pad.status().hold, TdHold::TD_HOLD_STATION_DEAF);
-    assert_eq!(pad.message_count("255/190 hears nothing of this vehicle"), 1);
+    assert_eq!(pad.message_count("255/190 receives nothing of this vehicle"), 1);
 }
 
 #[test]
@@ -279,7 +279,7 @@ fn a_held_vehicle_disarms_after_a_minute() {
     }
 }
 
-/// Its station was killed, and nobody stands beside it.
+/// Its station was killed, and no crew stands beside it.
 #[test]
 fn a_vehicle_that_nobody_commands_disarms_itself() {
     let mut pad = Pad::rocket();
@@ -289,7 +289,7 @@ fn a_vehicle_that_nobody_commands_disarms_itself() {
     assert!(pad.vehicle.mode().interlocks.armed);
     pad.run(1.5);
     assert!(!pad.vehicle.mode().interlocks.armed && !pad.vehicle.aborted());
-    assert_eq!(pad.message_count("nothing heard of 255/190 for 60 s: DISARMED"), 1);
+    assert_eq!(pad.message_count("nothing received from 255/190 for 60 s: DISARMED"), 1);
     // The next station that arms it is in command.
     pad.speaking = vec![OTHER];
     pad.run(1.0);

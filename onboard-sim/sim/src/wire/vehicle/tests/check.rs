@@ -127,7 +127,7 @@ fn motions_of_the_page() -> Vec<([f64; 2], [f64; 4])> {
 
 fn without_feedback() -> Rocket {
     let mut flight = flight_of("none", &[]);
-    flight.recipe.mission.airframe.servos_tell = false;
+    flight.recipe.mission.airframe.servos_report = false;
     let mut rocket = Rocket::of(Vehicle::on_the_pad(&flight).unwrap());
     // Every check passes but one.
     rocket.run_until(|rocket| {

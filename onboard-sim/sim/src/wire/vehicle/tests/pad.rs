@@ -69,15 +69,15 @@ fn on_the_way_up_the_telemetry_has_booster_and_apogee() {
     assert_eq!(rocket.computer().abort_effect(), AbortEffect::SafeOnPad, "it has not lifted off");
     rocket.run_until(|rocket| rocket.phase() == Phase::Coast);
     assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteAtApogee);
-    let told = rocket.descent();
+    let reported = rocket.descent();
     let began_s = rocket.state().since_zero_s().unwrap();
     rocket.run_until(|rocket| descent(rocket).booster == TdBooster::TD_BOOSTER_SEPARATED);
     rocket.run_until(|rocket| !rocket.phase().before_apogee());
     assert_eq!(rocket.computer().abort_effect(), AbortEffect::ChuteNow, "from the first frame on");
     let reached_m = rocket.sortie.world().state().position_m.z;
-    assert!((f64::from(told.apogee_m) - reached_m).abs() < 0.03 * reached_m, "{told:?}, {reached_m}");
+    assert!((f64::from(reported.apogee_m) - reached_m).abs() < 0.03 * reached_m, "{reported:?}, {reached_m}");
     let took_s = rocket.state().since_zero_s().unwrap() - began_s;
-    assert!((f64::from(told.time_to_apogee_s) - took_s).abs() < 0.05 * took_s, "{told:?}, {took_s}");
+    assert!((f64::from(reported.time_to_apogee_s) - took_s).abs() < 0.05 * took_s, "{reported:?}, {took_s}");
     rocket.advance();
     let over = rocket.descent();
     assert!(over.apogee_m.abs() < 1e-9 && over.time_to_apogee_s.abs() < 1e-9, "{over:?}");
@@ -175,7 +175,7 @@ fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_bu
         rocket.request(CrewCommand::Start);
         let release_s = rocket.computer().mode().countdown_end_s.unwrap();
         let mut flight = rocket.vehicle.sortie.clone();
-        let mut lit = 0;
+        let mut energised = 0;
         for frame in 0..2_600 {
             let mode = *flight.computer().mode();
             let risen = flight.computer().flown().is_some() && !mode.phase.on_pad();
@@ -195,12 +195,12 @@ fn after_an_abort_a_disarm_or_a_hold_at_any_moment_no_igniter_is_on_but_for_a_bu
             assert!(disarmed || !mode.phase.on_pad(), "{mode:?}");
             let aborted = accepted_in(&flight, CrewCommand::Abort, frames);
             assert!(aborted, "{mode:?}");
-            lit += u32::from(flight.computer().commands().outputs.is_on(PyroOutput::AscentIgniter));
+            energised += u32::from(flight.computer().commands().outputs.is_on(PyroOutput::AscentIgniter));
             flight.step();
         }
         let since_s = f64::from(u32::try_from(flight.frame()).unwrap()) * FRAME_S - release_s;
         assert!((2.9..3.1).contains(&since_s), "{since_s}");
-        assert_eq!(lit > 10, start == StartPoint::Pad, "{start:?}: {lit} frames lit");
+        assert_eq!(energised > 10, start == StartPoint::Pad, "{start:?}: {energised} frames");
     }
 }
 

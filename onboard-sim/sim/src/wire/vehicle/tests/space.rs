@@ -35,9 +35,9 @@ pub(super) fn in_phase(flight: &RocketFlight, phase: Phase) -> Rocket {
 /// servo, and no longer.
 #[test]
 fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
-    for (stuck, tells) in [(false, true), (true, true), (false, false)] {
+    for (stuck, reports) in [(false, true), (true, true), (false, false)] {
         let mut flight = mission_of("mk3", "none", &[]);
-        flight.recipe.mission.airframe.servos_tell = tells;
+        flight.recipe.mission.airframe.servos_report = reports;
         // Who cannot be armed without two pairs of eyes is armed before its servos fall silent.
         let mut rocket = rocket_of(&mission_of("mk3", "none", &[])).run_to(Phase::AeroDescent);
         rocket.vehicle.sortie.reconfigure(&flight.recipe.mission);
@@ -60,10 +60,10 @@ fn the_charge_waits_for_the_fins_over_the_hatch_and_for_no_stuck_one() {
         rocket.run_until(|rocket| rocket.computer().commands().outputs.is_on(PyroOutput::Parachute));
         let waited_s = rocket.time_s() - since_s;
         // 90 degrees at 300 degrees/s, and 20 ms.
-        assert!(waited_s > 0.1 && waited_s < 0.33, "{stuck} {tells}: {waited_s}");
+        assert!(waited_s > 0.1 && waited_s < 0.33, "{stuck} {reports}: {waited_s}");
         assert_eq!(shut(&rocket) < 0.3, stuck);
-        assert!(stuck || shut(&rocket) > 0.7, "{tells}: {}", shut(&rocket));
-        assert!((waited_s > 0.31) == (stuck || !tells), "{stuck} {tells}: {waited_s}");
+        assert!(stuck || shut(&rocket) > 0.7, "{reports}: {}", shut(&rocket));
+        assert!((waited_s > 0.31) == (stuck || !reports), "{stuck} {reports}: {waited_s}");
     }
 }
 

@@ -162,3 +162,35 @@ fn data_out_of_range_are_refused() {
     let error = World::new(&Site::default(), &light, &motor, &Truth::default(), &start, 1).unwrap_err();
     assert!(matches!(error, WorldError::Motor { propellant_kg, .. } if propellant_kg > 0.19), "{error}");
 }
+
+/// Five steps at once end where they do one after the other: in a fall with moving fins, under the
+/// landing motor with a swinging gimbal, and while the parachute opens.
+#[test]
+fn a_stride_ends_where_its_steps_do() {
+    let truth = Truth { wind_m_s: 6.0, ..Truth::default() };
+    for (ignites, ejects) in [(false, false), (true, false), (false, true)] {
+        let mut strides = world("mk3", &truth, &leaning(300.0, 0.1, 0.05)).with_fins_at(1.0);
+        let mut steps = strides.clone();
+        for frame in 0..1_000 {
+            let sway = libm::sin(0.05 * f64::from(frame));
+            let actuators = Actuators {
+                fins_rad: [1.0 + 0.4 * sway, 1.0 - 0.4 * sway, 1.0 + 0.2 * sway, 1.0],
+                gimbal_rad: [0.1 * sway, -0.05 * sway],
+                ignite: ignites && frame >= 200,
+                parachute: ejects && frame >= 200,
+                ..Actuators::NONE
+            };
+            assert_eq!(strides.stride(&actuators, STRIDE), STRIDE);
+            steps.advance(&actuators, 1);
+            (1..STRIDE).for_each(|_| steps.step(&actuators));
+        }
+        let [one, other] = [&strides, &steps].map(World::state);
+        let apart_m = (one.position_m - other.position_m).norm();
+        let apart_m_s = (one.velocity_m_s - other.velocity_m_s).norm();
+        let apart_rad = one.world_from_body.angle_to(&other.world_from_body);
+        assert!(
+            apart_m < 0.05 && apart_m_s < 0.05 && apart_rad < 0.01,
+            "{ignites} {ejects}: {apart_m} m, {apart_m_s} m/s, {apart_rad} rad"
+        );
+    }
+}

@@ -217,10 +217,10 @@ fn regress_mk3s_legs_stand_undamaged_at_every_corner_of_their_design() {
                 for number in 1..=4 {
                     let number = 8 * corner + 4 * kind + number;
                     let (outcome, strain) = until_rest(&mut at_contact(&mk3, contact, number));
-                    let told = format!("{foot:?}, {friction}, corner {corner}, {number}: {strain:?}");
-                    assert_eq!(outcome, RestOutcome::Upright, "{told}");
-                    assert!(strain.stroke_used < 0.95 && strain.strength_used < 1.0, "{told}");
-                    assert!(strain.clearance_m > 0.07, "{told}");
+                    let reported = format!("{foot:?}, {friction}, corner {corner}, {number}: {strain:?}");
+                    assert_eq!(outcome, RestOutcome::Upright, "{reported}");
+                    assert!(strain.stroke_used < 0.95 && strain.strength_used < 1.0, "{reported}");
+                    assert!(strain.clearance_m > 0.07, "{reported}");
                 }
             }
         }
@@ -237,9 +237,9 @@ fn regress_mk3s_legs_on_ground_that_grips() {
         for number in 1..=8 {
             let (outcome, strain) = until_rest(&mut at_contact(&mk3, contact, 8 * corner + number));
             let slow = contact.across_m_s < 0.7 || contact.tilt_deg < 10.0 || contact.rate_deg_s < 60.0;
-            let told = format!("corner {corner}, {number}: {outcome:?} {strain:?}");
-            assert!(strain.stroke_used < 0.95 && strain.clearance_m > 0.07, "{told}");
-            assert!(!slow || outcome == RestOutcome::Upright, "{told}");
+            let reported = format!("corner {corner}, {number}: {outcome:?} {strain:?}");
+            assert!(strain.stroke_used < 0.95 && strain.clearance_m > 0.07, "{reported}");
+            assert!(!slow || outcome == RestOutcome::Upright, "{reported}");
             tripped += u32::from(outcome != RestOutcome::Upright);
             overloaded += u32::from(strain.strength_used > 1.0);
         }
