@@ -10,6 +10,11 @@ pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
+/// Loss of messages, as every command reports it.
+pub(crate) fn messages_lost(count: u64) -> String {
+    format!("{} lost", counted(count, "message"))
+}
+
 /// A cell that is wider does not push the others away. (A width of more than 16 bits cannot be
 /// formatted.)
 const WIDEST: usize = 200;
