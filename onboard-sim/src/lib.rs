@@ -8,6 +8,7 @@
 //! * [`statistics`], [`summary`]: percentiles and texts from the rows.
 //! * [`hazard`]: impact areas for each case of a flight.
 //! * [`check`]: prediction for an unbuilt vehicle whether it will land, and what to change.
+//! * [`field`]: the lines of the field on these pages.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.
@@ -17,6 +18,7 @@
 
 pub mod card;
 pub mod check;
+pub mod field;
 pub mod files;
 pub mod frame;
 pub mod hazard;

@@ -15,3 +15,4 @@ mod hazard;
 mod playback;
 mod site;
 mod unbraked;
+mod winds;
