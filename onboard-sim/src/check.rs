@@ -225,6 +225,7 @@ pub fn check(
     }
     rows.extend(vehicle.stands());
     rows.extend(without_place(&recipe.mission.sensors));
+    rows.extend(crate::field::crowd(recipe));
     if flights > 0 {
         rows.push(flown(recipe, &fly(recipe, flights, done)?));
     }

@@ -9,6 +9,7 @@
 //! * [`hazard`]: impact areas for each case of a flight.
 //! * [`check`]: prediction for an unbuilt vehicle whether it will land, and what to change.
 //! * [`drawing`]: a vehicle to scale, and the parts that overlap.
+//! * [`field`]: the lines of the field on these pages.
 //! * [`frame`]: another motor in an airframe.
 //! * [`card`]: the landing card.
 //! * [`playback`]: recorded sensors played to the flight computer.
@@ -19,6 +20,7 @@
 pub mod card;
 pub mod check;
 pub mod drawing;
+pub mod field;
 pub mod files;
 pub mod frame;
 pub mod hazard;

@@ -24,6 +24,7 @@
 //!   record of the log;
 //! * `background` (feature `transport`): files that are written beside a run loop;
 //! * [`book`]: the record of crew actions, with a signed hash over all entries;
+//! * `field` (a feature): the lines of a launch field, from a file;
 //! * [`records`]: the records of the flight log, generated;
 //! * [`log`]: the flight log;
 //! * `program` (a feature): exit codes, completions and manual pages of the programs.
@@ -86,6 +87,8 @@ pub mod command;
 pub mod crew_file;
 pub mod dialect;
 pub mod duplicate;
+#[cfg(feature = "field")]
+pub mod field;
 pub mod frame;
 pub mod ftp;
 pub mod hub;

@@ -17,6 +17,8 @@ pub struct Recipe {
     pub dispersion: Dispersion,
     pub dispersion_name: String,
     pub dispersion_toml: String,
+    /// Text of the lines of the field, for people and logs; no flight depends on it.
+    pub field: Option<String>,
     /// Seed of everything random, for all flights of this recipe.
     pub seed: u64,
     /// The faults of every flight.
@@ -52,6 +54,7 @@ impl Recipe {
             dispersion: Dispersion::from_toml(dispersion_toml, dispersion_name)?,
             dispersion_name: dispersion_name.to_owned(),
             dispersion_toml: dispersion_toml.to_owned(),
+            field: None,
             seed: 1,
             faults: Vec::new(),
         })

@@ -139,7 +139,13 @@ const NAMED: [[f64; 2]; 4] = [[0.0, 1.0], [0.0, -1.0], [0.71, 0.71], [0.71, -0.7
 /// The circles of the permitted winds from above, to scale, with the line downwind. `wind_from_deg`
 /// is the direction of the wind, clockwise from north, which is up then; without it up is downwind.
 /// `None` without a circle.
-pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
+///
+/// The lines of the field, as points north and east, m, are drawn where north is known.
+pub fn plan(
+    winds: &[InWind],
+    wind_from_deg: Option<f64>,
+    field: &[(&str, Vec<(f64, f64)>)],
+) -> Option<String> {
     let limit_m_s = limit_m_s(winds)?;
     let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);
     let circles: Vec<(f64, &Circle)> =
@@ -158,6 +164,11 @@ pub fn plan(winds: &[InWind], wind_from_deg: Option<f64>) -> Option<String> {
         format!("<line class=\"{class}\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>")
     };
     let (mut lines, mut names) = (String::new(), String::new());
+    for (kind, points) in field.iter().filter(|_| wind_from_deg.is_some()) {
+        let points = points.iter().map(|(north, east)| format!("{:.1},{:.1}", scale * east, -scale * north));
+        let points = points.collect::<Vec<_>>().join(" ");
+        let _ = write!(lines, "<polyline class=\"{kind}\" points=\"{points}\"/>");
+    }
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
         let radius = scale * circle.keep_out_m;
         let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");

@@ -7,6 +7,7 @@ use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use sim::dispersion::may_be_kinder;
+use sim::wire::field::{field_of, pad_of};
 
 use super::range_safety::{
     Circle, FEWEST, InWind, PERMITTED_M_S, aborts, calibres, in_winds, limit_m_s, plan, thrust_to_weight,
@@ -119,7 +120,7 @@ impl Card {
                 ),
                 Section { title: "On the day", content: Content::Blanks(words_of("day", &[])) },
             ],
-            notes: Vec::new(),
+            notes: crate::field::crowd_alarm(&self.recipe, people_m(winds)).into_iter().collect(),
         }
     }
 
@@ -170,6 +171,7 @@ impl Card {
             ("name", Some(mission.name.clone())),
             ("site", Some(mission.site.to_string())),
             ("wind", Some(self.recipe.dispersion.wind_over_height())),
+            ("field", field_of(&self.recipe).map(|field| field.distances(pad_of(&self.recipe.mission), (0.0, 0.0)))),
             ("hash", Some(self.hash())),
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),
@@ -233,7 +235,7 @@ impl Card {
     }
 
     fn places(&self, winds: &[InWind]) -> Section {
-        let plan = plan(winds, self.wind_from_deg);
+        let plan = plan(winds, self.wind_from_deg, &crate::field::lines_m(&self.recipe));
         let limit_m_s = limit_m_s(winds);
         let forbidden = winds.first().is_some_and(|wind| wind.wind_m_s > PERMITTED_M_S);
         let degrees = |turned_deg: f64| {
@@ -315,6 +317,13 @@ impl Card {
             }
         }
     }
+}
+
+/// Largest radius without people in the winds to fly in, or of all, m.
+fn people_m(winds: &[InWind]) -> f64 {
+    let limit_m_s = limit_m_s(winds).unwrap_or(f64::INFINITY);
+    let circles = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s).filter_map(|wind| wind.circle);
+    circles.map(|circle| circle.keep_out_m).fold(0.0, f64::max)
 }
 
 fn wind_table(winds: &[InWind]) -> Section {

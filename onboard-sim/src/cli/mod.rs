@@ -25,6 +25,7 @@ use protocol::log::writer::LogHeader;
 use protocol::program::{in_range, is_quiet};
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
+use sim::wire::field::with_field;
 use sim::world::wind::aloft::WindsAloft;
 use toml_edit::{Array, DocumentMut};
 
@@ -110,7 +111,8 @@ fn read(path: &Path) -> anyhow::Result<String> {
 fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -> anyhow::Result<Recipe> {
     let mission_toml = text_of(mission_name, mission::BUILTIN, "mission")?;
     let set_toml = text_of(set, dispersion::BUILTIN, "set of dispersions")?;
-    let recipe = Recipe { seed, ..Recipe::from_texts((mission_name, &mission_toml), (set, &set_toml))? };
+    let recipe = Recipe::from_texts((mission_name, &mission_toml), (set, &set_toml))?;
+    let recipe = Recipe { seed, ..with_field(recipe, mission_name)? };
     Ok(match start {
         Some(start) => recipe.starting_at(start)?,
         None => recipe,

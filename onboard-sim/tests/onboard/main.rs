@@ -30,3 +30,4 @@ fn recipe_of(name: &str, dispersion: &str) -> Recipe {
     let set = (dispersion, Dispersion::builtin_toml(dispersion).expect("a set"));
     Recipe::from_texts(*mission, set).expect("a recipe")
 }
+mod winds;

@@ -250,6 +250,10 @@ pub struct Mission {
     #[serde(skip)]
     pub expected: Option<Box<Expectation>>,
     pub site: Site,
+    /// File with the lines of the field, `site.field`, relative to the mission's. Nothing on board
+    /// reads it.
+    #[serde(skip)]
+    pub field_file: Option<String>,
     #[serde(default)]
     pub sensors: SensorPlaces,
     pub exhaust: Exhaust,

@@ -8,6 +8,7 @@ use crate::outcome::{by_envelope, by_table_2};
 use crate::outside::Watch;
 use crate::recipe::Recipe;
 use crate::sortie::Sortie;
+use crate::wire::field::RUN_FACT;
 use crate::world::Strain;
 use flight::computer::messages::{CrewMessage, Severity};
 use flight::computer::pilot::Pilot;
@@ -35,10 +36,11 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
         ("faults", faults),
         ("start_unix_ns", start_unix_ns.to_string()),
     ];
+    let field = recipe.field.clone().map(|text| (RUN_FACT, text));
     LogHeader {
         writer: writer.to_owned(),
         start_unix_ns,
-        run: run.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
+        run: run.into_iter().chain(field).map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
         profile_toml: Some(recipe.mission_toml.clone()),
         scenario_toml: Some(recipe.dispersion_toml.clone()),
     }

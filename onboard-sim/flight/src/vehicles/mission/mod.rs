@@ -17,6 +17,7 @@ use core::ops::Range;
 use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::{Mission, StartPoint};
 use serde::Deserialize as _;
+use serde::de::IntoDeserializer as _;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
@@ -75,6 +76,11 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
     };
     let bad_value = |bad| FileError::bad_value(origin, bad);
     let mut table = DeTable::parse(text).map_err(not_a_mission)?;
+    // The lines of the field are for people: nothing on board depends on them.
+    let field = match table.get_mut().get_mut("site").map(Spanned::get_mut) {
+        Some(DeValue::Table(site)) => site.remove("field"),
+        _ => None,
+    };
     let (mut stated, mut changed) = (Vec::new(), Vec::new());
     leaves("", table.get_ref(), &mut |key| stated.push(key));
     for (defaults, are_ours) in [(CONTROLLER, true), (DEFAULTS, false)] {
@@ -87,6 +93,9 @@ pub fn from_toml(text: &str, origin: &str) -> Result<Mission, MissionError> {
         fill(table.get_mut(), defaults.into_inner());
     }
     let mut mission = Mission::deserialize(Deserializer::from(table)).map_err(not_a_mission)?;
+    if let Some(field) = field {
+        mission.field_file = Some(String::deserialize(field.into_deserializer()).map_err(not_a_mission)?);
+    }
     check_start(&mission, origin)?;
     let own = mission.lot.as_ref().and_then(|lot| lot.curve.as_deref());
     let curve = motors::named(own.unwrap_or(&mission.airframe.motor))?;

@@ -12,6 +12,7 @@ use flight::vehicle::mission::StartPoint;
 use protocol::log::writer::LogHeader;
 
 use super::FlyError;
+use crate::wire::field::with_field;
 use crate::wire::vehicle::{RocketFlight, Vehicle};
 
 /// The default dispersions of a mission: a normal day at the field.
@@ -64,7 +65,8 @@ pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
     };
     let dispersion =
         (DISPERSION, Dispersion::builtin_toml(DISPERSION).map_err(crate::recipe::RecipeError::from)?);
-    Ok(RocketFlight { recipe: Recipe::from_texts((name_or_path, &toml), dispersion)?, number: 0 })
+    let recipe = with_field(Recipe::from_texts((name_or_path, &toml), dispersion)?, name_or_path)?;
+    Ok(RocketFlight { recipe, number: 0 })
 }
 
 // Arms and starts a flight without a crew.

@@ -138,6 +138,9 @@ pub enum FlyError {
     /// The mission is wrong.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
+    /// The mission's field cannot be used.
+    #[error(transparent)]
+    Field(#[from] protocol::field::FieldError),
     /// The flight cannot be set up.
     #[error(transparent)]
     Rocket(#[from] crate::sortie::SetUpError),

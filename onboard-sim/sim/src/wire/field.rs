@@ -1,0 +1,33 @@
+//! The lines of the field that a mission names: read beside its file, and stored in logs.
+
+use std::path::Path;
+
+use flight::vehicle::mission::Mission;
+use protocol::field::{Field, FieldError};
+use protocol::motion::Degrees;
+
+use crate::recipe::Recipe;
+
+/// The fact about a run with the text of its field.
+pub const RUN_FACT: &str = "field";
+
+/// Where the pad is.
+pub fn pad_of(mission: &Mission) -> Degrees {
+    Degrees { latitude: mission.site.latitude_deg, longitude: mission.site.longitude_deg }
+}
+
+/// This recipe with the field that its mission names, whose file is at this path.
+///
+/// # Errors
+/// The file cannot be read, or is no field around the pad.
+pub fn with_field(recipe: Recipe, mission_path: &str) -> Result<Recipe, FieldError> {
+    let Some(file) = &recipe.mission.field_file else { return Ok(recipe) };
+    let text = Field::text_of(file, Path::new(mission_path))?;
+    Field::parse(&text, pad_of(&recipe.mission), file)?;
+    Ok(Recipe { field: Some(text), ..recipe })
+}
+
+/// The field of a recipe.
+pub fn field_of(recipe: &Recipe) -> Option<Field> {
+    Field::parse(recipe.field.as_ref()?, pad_of(&recipe.mission), RUN_FACT).ok()
+}
