@@ -74,7 +74,8 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let roll_rad = TAU * chance.unit();
     let flight_seed = chance.random.next_u64();
 
-    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).with_aloft(sigma.winds_aloft.as_ref());
+    let wind =
+        Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).with_aloft(sigma.winds_aloft.as_ref());
     let carried = wind.mean_m_s(height_m) * start.carried_share;
     // It leans in the direction of its motion; the roll angle is arbitrary.
     let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();
@@ -334,7 +335,8 @@ mod tests {
     fn val_hand_ignition_delays_have_a_tail() {
         let mission = flight::vehicles::mission::builtin("mk3").unwrap().unwrap();
         let plain = Dispersion::builtin("none").unwrap();
-        let tailed = Dispersion { mismatch: Mismatch { ignition_tail_s: 0.1, ..plain.mismatch }, ..plain.clone() };
+        let tailed =
+            Dispersion { mismatch: Mismatch { ignition_tail_s: 0.1, ..plain.mismatch }, ..plain.clone() };
         let late = |over_s: f64| {
             (0..400)
                 .filter(|number| {

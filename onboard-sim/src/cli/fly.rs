@@ -320,7 +320,10 @@ fn print_summary(summary: &FlightSummary) -> anyhow::Result<()> {
     }
     if let Some(quantiles) = summary.lateness.quantiles() {
         let [median_ms, p99_ms, worst_ms] = quantiles.map(|late| 1e3 * late.as_secs_f64());
-        writeln!(out, "frames began late by: median {median_ms:.1} ms, p99 {p99_ms:.1} ms, worst {worst_ms:.1} ms")?;
+        writeln!(
+            out,
+            "frames began late by: median {median_ms:.1} ms, p99 {p99_ms:.1} ms, worst {worst_ms:.1} ms"
+        )?;
     }
     let ending = summary.verdict.as_ref().and_then(|verdict| verdict.ending.as_deref());
     match (&summary.outcome, ending) {

@@ -24,7 +24,10 @@ fn a_file_with_the_name_of_the_lock_is_unchanged() {
 fn a_wrong_request_is_refused_with_the_reason() {
     let directory = tempfile::tempdir().unwrap();
     for (arguments, words) in [
-        (&["--out", "x", "--flights", "0"][..], "'--flights <N>': must be a whole number from 1 to 1000000000"),
+        (
+            &["--out", "x", "--flights", "0"][..],
+            "'--flights <N>': must be a whole number from 1 to 1000000000",
+        ),
         (&["--out", "x", "--flights", "-5"], "'-5' for '--flights <N>': must be a whole number from 1 to"),
         (&["--out", "x", "--seed", "abc"], "'abc' for '--seed <SEED>': must be a whole number from 0 to"),
         (&["--out", "x", "--dispersion", "windy"], "neither a built-in set of dispersions"),

@@ -18,6 +18,7 @@ mod missions;
 mod playback;
 mod site;
 mod unbraked;
+mod winds;
 
 use sim::dispersion::Dispersion;
 use sim::recipe::Recipe;
@@ -30,4 +31,3 @@ fn recipe_of(name: &str, dispersion: &str) -> Recipe {
     let set = (dispersion, Dispersion::builtin_toml(dispersion).expect("a set"));
     Recipe::from_texts(*mission, set).expect("a recipe")
 }
-mod winds;
