@@ -11,9 +11,8 @@ use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::program::{EXIT_CODES, Manual, Shown, in_range};
 use protocol::transport::LinkAddress;
 use serde::Deserialize;
-use sim::wire::fly::StartPoint;
+use sim::wire::fly::{Speed, StartPoint};
 
-use crate::demo::Speed;
 use crate::model::words;
 
 const EXAMPLES: &str = "\

@@ -121,9 +121,8 @@ impl Config {
     /// # Errors
     /// The flags are of another command.
     pub fn fill(&self, station: &mut StationArgs, given: &ArgMatches, is_daemon: bool) -> anyhow::Result<()> {
-        let takes_links =
-            is_daemon && !station.describes_demonstration() && !self.flags.link.connect.is_empty();
         let flags = self.flags.clone();
+        let takes_links = is_daemon && !station.describes_demonstration() && !flags.link.connect.is_empty();
         station.flags = if takes_links || !station.flags.link.connect.is_empty() {
             flags
         } else {

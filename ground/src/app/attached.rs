@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use futures_util::StreamExt as _;
-use protocol::log::record::{EventLevel, Record};
+use protocol::log::record::Record;
 use tokio::io::AsyncWriteExt as _;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::time::{MissedTickBehavior, interval, timeout};
@@ -22,7 +22,7 @@ use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::model::{
-    Action, CommandKind, Model, Request, Role, Seat, Settings, Speaker, Talk, Unfinished, abort_request_words,
+    Action, CommandKind, Model, Request, Role, Seat, Settings, Talk, Unfinished, abort_stamp,
 };
 use crate::update::{Msg, update};
 
@@ -140,7 +140,7 @@ pub async fn session(
         };
         let quit = act(actions, &mut model, &mut link, &mut output, times.theirs(clock.now())).await;
         let unix_s = clock.unix_ns() / 1_000_000_000;
-        store_unsent_abort(&mut is_unsent_stored, &mut model, unix_s, times.theirs(clock.now()));
+        store_unsent(&mut is_unsent_stored, &mut model, unix_s, times.theirs(clock.now()));
         let now = clock.now();
         output.show(&model, now, times.theirs(now))?;
         if quit {
@@ -159,12 +159,10 @@ async fn take_history(
     viewer: &Viewer,
 ) -> anyhow::Result<()> {
     // Stored for the station by another screen of this folder.
-    let unfinished = read_unfinished(Some(Path::new(""))).ok().flatten();
-    let pending = unfinished
-        .and_then(|unfinished| unfinished.abort)
-        .map(|at| format!("; ABORT requested at {at} NOT CONFIRMED"));
-    let silent =
-        format!("the station does not answer: it hangs or is stopped{}", pending.unwrap_or_default());
+    let stored = read_unfinished(Some(Path::new(""))).ok().flatten();
+    let pending = stored.and_then(|of| of.abort).map(|at| format!("; ABORT requested at {at} NOT CONFIRMED"));
+    let pending = pending.unwrap_or_default();
+    let silent = format!("the station does not answer: it hangs or is stopped{pending}");
     loop {
         let message = timeout(ANSWERS_WITHIN, link.receive()).await.with_context(|| silent.clone())?;
         let Some(message) = message else { return Ok(()) };
@@ -223,17 +221,17 @@ async fn find_again(named: Option<&Path>, links: &str, viewer: &Viewer) -> Optio
 
 /// Stores an abort beside the station's log while its station has not sent it, for the next station
 /// and its screens. A station that resumes stores it itself.
-fn store_unsent_abort(is_stored: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
-    let abort = model.link.why_abort_not_sent(now).map(|_| abort_request_words(unix_s, &model.settings.seat));
+fn store_unsent(is_stored: &mut bool, model: &mut Model, unix_s: u64, now: Duration) {
+    let abort = model.link.why_abort_not_sent(now).map(|_| abort_stamp(unix_s, &model.settings.seat));
     let changes = abort.is_some() != std::mem::replace(is_stored, abort.is_some());
     if !changes || (abort.is_none() && !model.link.station_lost) {
         return;
     }
     let folder = model.settings.log_path.as_deref().and_then(|log| Path::new(log).parent());
-    let unfinished = Unfinished { abort, ..model.unfinished(now) };
+    let stored = Unfinished { abort, ..model.unfinished(now) };
     let Some(folder) = folder.map(Path::to_owned) else { return };
     // In a thread: an abort that waits for a station must not wait for the disk.
-    let written = in_a_thread("unsent abort", move || write_unfinished(&folder, &unfinished));
+    let written = in_a_thread("unsent abort", move || write_unfinished(&folder, &stored));
     if let Err(error) = written {
         model.warn(now, format!("this abort is not stored for the next station: {error}"));
     }
@@ -256,7 +254,7 @@ fn report_unsent(model: &mut Model, request: &Request, now: Duration) {
     model.link.abort_unsent |= is_abort;
     let later = if is_abort { "; it is sent as soon as there is one" } else { "" };
     let text = format!("{what}: this screen has no station{later}");
-    model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+    model.error(now, text);
 }
 
 /// Applies a message of the station. Returns this screen's actions: the station executes the

@@ -99,8 +99,7 @@ impl Signals {
     /// # Errors
     /// The system refuses.
     pub fn listen() -> anyhow::Result<Self> {
-        let listen =
-            |kind, name| Ok::<_, anyhow::Error>((signal(kind).context("listening for signals")?, name));
+        let listen = |kind, name| anyhow::Ok((signal(kind).context("listening for signals")?, name));
         // The write fails instead: LOG FAILED, and the station continues.
         survive_file_size_limit().context("handling the limit of the file size")?;
         Ok(Self([
@@ -118,8 +117,7 @@ impl Signals {
     pub async fn next(&mut self) -> &'static str {
         poll_fn(|context| {
             let mut signals = self.0.iter_mut();
-            let come =
-                signals.find_map(|(signal, name)| signal.poll_recv(context).is_ready().then_some(*name));
+            let come = signals.find_map(|(one, name)| one.poll_recv(context).is_ready().then_some(*name));
             come.map_or(Poll::Pending, Poll::Ready)
         })
         .await

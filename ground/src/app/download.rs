@@ -118,7 +118,7 @@ const READ_AT_ONCE: usize = 256 * 1024;
 /// The files of one download.
 #[derive(Debug)]
 struct PartialLog {
-    complete: PathBuf,
+    log: PathBuf,
     part: PathBuf,
     file: File,
     crc: u32,
@@ -134,18 +134,14 @@ impl PartialLog {
         // The name comes over the air: it must not lead out of the folder.
         let is_plain = |letter: &char| letter.is_ascii_alphanumeric() || "._-".contains(*letter);
         let plain: String = name.chars().filter(is_plain).collect();
-        let complete = folder.join(format!("vehicle{vehicle}-{plain}"));
+        let log = folder.join(format!("vehicle{vehicle}-{plain}"));
         let is_it = |mut file| checksum(&mut file).is_ok_and(|here| here == crc);
-        anyhow::ensure!(
-            !File::open(&complete).is_ok_and(is_it),
-            "{} is this log already",
-            complete.display()
-        );
+        anyhow::ensure!(!File::open(&log).is_ok_and(is_it), "{} is this log already", log.display());
         let part = folder.join(format!("vehicle{vehicle}-{plain}.{crc:08X}.part"));
         let opened = File::options().create(true).read(true).append(true).open(&part);
         let file = opened.with_context(|| format!("opening {}", part.display()))?;
         let bytes = u32::try_from(file.metadata()?.len())?;
-        Ok((Self { complete, part, file, crc }, bytes))
+        Ok((Self { log, part, file, crc }, bytes))
     }
 
     /// Gives the complete log its name, or the next free one.
@@ -153,7 +149,7 @@ impl PartialLog {
     /// # Errors
     /// It differs from the vehicle's log, or the disk fails.
     fn finish(self) -> anyhow::Result<PathBuf> {
-        let Self { complete, part, mut file, crc } = self;
+        let Self { log, part, mut file, crc } = self;
         if checksum(&mut file)? != crc {
             std::fs::remove_file(&part)?;
             anyhow::bail!("the download differs from the vehicle's log (checksum); fetch it again");
@@ -161,13 +157,13 @@ impl PartialLog {
         file.sync_all()?;
         // A link fails if the name is taken; a rename would overwrite. Some file systems have no
         // such links.
-        let named = under_free_name(&complete, |name| match std::fs::hard_link(&part, name) {
+        let named = under_free_name(&log, |name| match std::fs::hard_link(&part, name) {
             Err(_) if name.symlink_metadata().is_err() => std::fs::rename(&part, name),
             linked => linked.and_then(|()| std::fs::remove_file(&part)),
         });
-        let (free, ()) = named
-            .with_context(|| format!("{}: the download is in {}", complete.display(), part.display()))?;
-        if let Some(words) = other_name(&complete, &free) {
+        let (free, ()) =
+            named.with_context(|| format!("{}: the download is in {}", log.display(), part.display()))?;
+        if let Some(words) = other_name(&log, &free) {
             print(format!("{words}\n").as_bytes())?;
         }
         Ok(free)
@@ -208,11 +204,11 @@ mod partial_log_tests {
         let (mut partial, bytes) = open(folder.path(), crc).unwrap();
         assert_eq!(bytes, 3);
         partial.file.write_all(b"defg").unwrap();
-        let complete = partial.finish().unwrap();
-        assert_eq!(complete, folder.path().join("vehicle1-..flight.mcap"));
-        assert_eq!(std::fs::read(&complete).unwrap(), b"abcdefg");
+        let log = partial.finish().unwrap();
+        assert_eq!(log, folder.path().join("vehicle1-..flight.mcap"));
+        assert_eq!(std::fs::read(&log).unwrap(), b"abcdefg");
         let refused = open(folder.path(), crc).unwrap_err();
-        assert_eq!(refused.to_string(), format!("{} is this log already", complete.display()));
+        assert_eq!(refused.to_string(), format!("{} is this log already", log.display()));
     }
 
     #[test]
@@ -220,10 +216,10 @@ mod partial_log_tests {
         let folder = tempfile::tempdir().unwrap();
         let (mut partial, _) = open(folder.path(), crc::continued(0, b"new")).unwrap();
         partial.file.write_all(b"new").unwrap();
-        let complete = folder.path().join("vehicle1-..flight.mcap");
-        std::fs::write(&complete, "old").unwrap();
+        let log = folder.path().join("vehicle1-..flight.mcap");
+        std::fs::write(&log, "old").unwrap();
         assert_eq!(std::fs::read(partial.finish().unwrap()).unwrap(), b"new");
-        assert_eq!(std::fs::read(complete).unwrap(), b"old");
+        assert_eq!(std::fs::read(log).unwrap(), b"old");
     }
 
     #[test]

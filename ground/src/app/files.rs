@@ -28,17 +28,13 @@ use crate::model::{
 ///
 /// # Errors
 /// A file cannot be created.
-pub fn open_log(
-    choice: Option<&LogChoice>,
-    with_tlog: bool,
-    header: &LogHeader,
-) -> anyhow::Result<Option<Recorder>> {
-    let path = match choice {
+pub fn open_log(log: Option<&LogChoice>, tlog: bool, header: &LogHeader) -> anyhow::Result<Option<Recorder>> {
+    let path = match log {
         Some(LogChoice::None) => return Ok(None),
         Some(LogChoice::File(path)) => path.clone(),
         None => named_by_time(header)?,
     };
-    Ok(Some(Recorder::create(&path, with_tlog, header)?))
+    Ok(Some(Recorder::create(&path, tlog, header)?))
 }
 
 fn named_by_time(header: &LogHeader) -> anyhow::Result<PathBuf> {
@@ -363,8 +359,8 @@ pub(super) fn newest_place(folder: Option<&Path>, now_unix_s: u64) -> Option<Las
     let ours = place_files(folder?);
     // Other files, such as a KML, are skipped.
     let places = ours.filter_map(|file| {
-        let place: LastPlace =
-            serde_json::from_reader(File::open(file.path()).ok()?.take(PLACE_BYTES_MAX)).ok()?;
+        let text = File::open(file.path()).ok()?.take(PLACE_BYTES_MAX);
+        let place: LastPlace = serde_json::from_reader(text).ok()?;
         Some(LastPlace { pad: place.pad.filter(|pad| pad.is_valid()), ..place })
     });
     places

@@ -31,7 +31,6 @@ use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
 use protocol::key_file::KeyFile;
-use protocol::log::record::EventLevel;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
@@ -45,7 +44,7 @@ use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::{Danger, KeyOwner, Model, Role, Seat, Settings, Speaker, Unfinished, words::printable};
+use crate::model::{Danger, KeyOwner, Model, Role, Seat, Settings, Unfinished, words::printable};
 use crate::update::update;
 use crate::view::theme::Palette;
 use attached::Viewer;
@@ -165,23 +164,22 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, Arc::clone(&log_guard.0));
-    let (mut station, mut model, mut wire) =
-        match Box::pin(start(args, config, duty, (clock, demo_options), next_log)).await {
-            Ok(started) => started,
-            Err(error) => {
-                log_guard.discard();
-                return Err(error);
-            }
-        };
+    let mut station = match Box::pin(start(args, config, duty, (clock, demo_options), next_log)).await {
+        Ok(station) => station,
+        Err(error) => {
+            log_guard.discard();
+            return Err(error);
+        }
+    };
     if duty.is_daemon {
-        print(output::greeting(&model).as_bytes())?;
+        print(output::greeting(&station.model).as_bytes())?;
     }
-    let ran = station.run(&mut model, &mut wire).await;
-    station.close_book("the station ends", &mut model, &mut wire);
-    if let Some(msg) = wire.save_timestamps() {
-        update(&mut model, msg, clock.now());
+    let ran = station.run().await;
+    station.close_book("the station ends");
+    if let Some(msg) = station.wire.save_timestamps() {
+        update(&mut station.model, msg, clock.now());
     }
-    station.close(&mut model).await;
+    let model = Box::pin(station.close()).await;
     let log_path = log_guard.finish();
     ran?;
     let exit = exit::decide(&model.outcome, duty.interactive);
@@ -202,7 +200,7 @@ async fn start(
     duty: Duty,
     (clock, demo_options): (Clock, Option<DemoOptions>),
     mut next_log: NextLog,
-) -> anyhow::Result<(Station, Model, Wire)> {
+) -> anyhow::Result<Station> {
     let Duty { is_daemon, interactive, time_limit, json } = duty;
     let recorder = next_log.guarded().clone();
     let link = &args.flags.link;
@@ -214,8 +212,8 @@ async fn start(
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
     next_log.book_key = book_key;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
-    let checklist =
-        args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
+    let checklist = args.flags.checklist.as_deref();
+    let checklist = checklist.map(|path| open_checklist(path, start_unix_s)).transpose()?;
     // A demonstration flies this mission, so it cannot fly another.
     let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
     let mission = named.map(load_flight).transpose()?;
@@ -278,6 +276,8 @@ async fn start(
     let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
     model.repeats_reported = output.reports_repeats();
     let mut station = Station {
+        model,
+        wire,
         clock,
         log_time,
         recorder,
@@ -299,9 +299,9 @@ async fn start(
         report_at: Duration::ZERO,
         next_log,
     };
-    station.open_book(&model, "");
-    station.publish_stored(&model, clock.now());
-    Ok((station, model, wire))
+    station.open_book("");
+    station.publish_stored();
+    Ok(station)
 }
 
 /// Reports the demonstration, before anything else, and a log name that differs from the given one.
@@ -322,9 +322,8 @@ fn restore_unfinished(model: &mut Model, log: Option<&Recorder>, now: Duration) 
     model.place = newest_place(folder, unix_s);
     if !model.settings.demonstration {
         let unfinished = read_unfinished(folder).unwrap_or_else(|why| {
-            let text =
-                format!("the unfinished state of the last run cannot be read, so people wait: {why:#}");
-            model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+            let what = "the unfinished state of the last run cannot be read, so people wait";
+            model.error(now, format!("{what}: {why:#}"));
             Some(Unfinished { abort: None, danger: Some(Danger::NotReported) })
         });
         if let Some(unfinished) = unfinished {
@@ -388,10 +387,7 @@ impl KeyRing {
     /// A file cannot be read, others can read it, or the crew has no member of this name.
     pub(super) fn open(link: &LinkArgs) -> anyhow::Result<Self> {
         let Some(shared) = link.key.as_deref() else {
-            anyhow::ensure!(
-                link.crew.is_none(),
-                "--crew needs --key, the key that vehicle and stations share"
-            );
+            anyhow::ensure!(link.crew.is_none(), "--crew needs --key, which vehicle and stations share");
             return Ok(Self { key: None, owner: None, book_key: None, roles: Vec::new() });
         };
         let crew = link.crew.as_deref().map(CrewFile::open).transpose()?;

@@ -18,9 +18,7 @@ use super::output::absolute;
 use super::programs::in_a_thread;
 use super::server::hello;
 use super::station::Station;
-use super::wire::Wire;
 use crate::cli::{LogChoice, StationArgs};
-use crate::model::Model;
 use crate::update::Msg;
 
 /// A log of this size is ended: a day over a radio of 57,600 baud, which brings 490 MB.
@@ -63,20 +61,21 @@ fn file_name(path: &Path) -> String {
 impl Station {
     /// Begins the next log if the present one is long and no vehicle flies, or immediately if it
     /// was removed.
-    pub(super) fn rotate_log(&mut self, model: &mut Model) {
+    pub(super) fn rotate_log(&mut self) {
         let now = self.clock.now();
         let ended = self.next_log.ending.as_ref().map(Receiver::try_recv);
         if let Some(Ok(ended)) = &ended {
             self.next_log.ending = None;
             if let Err(why) = ended {
-                model.warn(now, format!("the log before is not complete: {why}"));
+                self.model.warn(now, format!("the log before is not complete: {why}"));
             }
         }
         let is_long = self.log_watch.bytes() >= LONG_BYTES;
         let waits = now < self.next_log.not_before || matches!(ended, Some(Err(TryRecvError::Empty)));
         // A demonstration has one log, shared with its vehicle: it is written again at the end.
-        let is_removed = model.log.removed && self.log_watch.removed && !model.settings.demonstration;
-        if !waits && (is_removed || is_long && model.may_change_log(now)) {
+        let is_removed =
+            self.model.log.removed && self.log_watch.removed && !self.model.settings.demonstration;
+        if !waits && (is_removed || is_long && self.model.may_change_log(now)) {
             self.begin_next_log();
         }
     }
@@ -95,12 +94,7 @@ impl Station {
     }
 
     /// Continues in the next log, once it is created.
-    pub(super) fn change_log(
-        &mut self,
-        next: anyhow::Result<Option<Recorder>>,
-        model: &mut Model,
-        wire: &mut Wire,
-    ) {
+    pub(super) fn change_log(&mut self, next: anyhow::Result<Option<Recorder>>) {
         let now = self.clock.now();
         self.next_log.begins = false;
         let next = match next {
@@ -108,26 +102,25 @@ impl Station {
             Ok(None) => return,
             Err(why) => {
                 self.next_log.not_before = now + AGAIN_AFTER;
-                return model.warn(now, format!("the log stays the same: {why:#}"));
+                return self.model.warn(now, format!("the log stays the same: {why:#}"));
             }
         };
         let Some(before) = &self.recorder else { return };
         let before_name = file_name(before.path());
-        self.close_book(&format!("the log continues in {}", file_name(next.path())), model, wire);
-        let end_of_book = model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
+        self.close_book(&format!("the log continues in {}", file_name(next.path())));
+        let end_of_book = self.model.book.short().map_or_else(String::new, |end| format!(" with book {end}"));
         let before = self.next_log.guarded().replace(next.clone());
-        wire.recorder = Some(next.clone());
+        self.wire.recorder = Some(next.clone());
         (self.recorder, self.log_watch) = (Some(next.clone()), LogWatch::default());
         // In a thread, because the disk may be slow. Without one the last handle is dropped,
         // and the recorder ends the log by itself.
         let end = |log: Recorder| in_a_thread("log end", move || log.finish().map(drop)).ok();
         self.next_log.ending = before.and_then(end);
-        self.open_book(model, &format!(", after {before_name}{end_of_book}"));
-        let path = |path: &Path| absolute(&path.display().to_string());
-        let log = path(next.path());
-        self.step(model, wire, Msg::LogBegins { log });
+        self.open_book(&format!(", after {before_name}{end_of_book}"));
+        let log = absolute(&next.path().display().to_string());
+        self.step(Msg::LogBegins { log });
         if let Some(server) = &mut self.server {
-            server.greet_with(hello(model));
+            server.greet_with(hello(&self.model));
         }
     }
 }
@@ -172,12 +165,12 @@ mod tests {
     }
 
     /// Changes the log and waits for the disk.
-    fn change_log(station: &mut Station, model: &mut Model, wire: &mut Wire) {
-        let before = model.settings.log_path.clone();
+    fn change_log(station: &mut Station) {
+        let before = station.model.settings.log_path.clone();
         station.begin_next_log();
-        while model.settings.log_path == before {
+        while station.model.settings.log_path == before {
             std::thread::yield_now();
-            station.take_outcomes(model, wire);
+            station.take_outcomes();
         }
     }
 
@@ -200,22 +193,22 @@ mod tests {
             let next_log = NextLog::new(&args, header, std::sync::Arc::clone(&guard.0));
             let config = Config::default();
             let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
-            let (mut station, mut model, mut wire) = started.unwrap();
-            let say = |wire: &mut Wire| {
+            let mut station = started.unwrap();
+            let say = |station: &mut Station| {
                 for _ in 0..3 {
-                    wire.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()), 0);
+                    station.wire.send(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()), 0);
                 }
             };
-            say(&mut wire);
-            station.rotate_log(&mut model);
-            assert_eq!(model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
-            change_log(&mut station, &mut model, &mut wire);
-            say(&mut wire);
-            assert_eq!(super::super::stations::of(&model, &[]).log, Some(path("flight-2.mcap")));
-            change_log(&mut station, &mut model, &mut wire);
-            say(&mut wire);
-            station.close_book("the station ends", &mut model, &mut wire);
-            station.close(&mut model).await;
+            say(&mut station);
+            station.rotate_log();
+            assert_eq!(station.model.settings.log_path.as_deref(), Some(&*log), "a short log goes on");
+            change_log(&mut station);
+            say(&mut station);
+            assert_eq!(super::super::stations::of(&station.model, &[]).log, Some(path("flight-2.mcap")));
+            change_log(&mut station);
+            say(&mut station);
+            station.close_book("the station ends");
+            Box::pin(station.close()).await;
             assert_eq!(guard.finish().unwrap(), Some(PathBuf::from(path("flight-3.mcap"))));
         });
         let logs = ["flight.mcap", "flight-2.mcap", "flight-3.mcap"].map(|name| read(Path::new(&path(name))));

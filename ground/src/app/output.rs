@@ -194,20 +194,15 @@ pub(super) fn greeting(model: &Model) -> String {
 }
 
 /// Prints the closing lines: the verdict limit by limit, and where the log is.
-pub fn closing(
-    model: &Model,
-    interactive: bool,
-    log_path: Result<&Option<PathBuf>, &RecorderError>,
-    now: Duration,
-) {
-    if interactive && !crate::app::screen::wait_for_end() {
+pub fn closing(model: &Model, on_screen: bool, log: Result<&Option<PathBuf>, &RecorderError>, now: Duration) {
+    if on_screen && !crate::app::screen::wait_for_end() {
         // A blocked terminal would keep the program and its link open for ever.
         return;
     }
     let mut text = String::new();
     match model.vehicle.verdict() {
         Some(verdict) => text.push_str(&verdict_table(model, &verdict.value, now)),
-        None if !interactive => text.push_str("no landing verdict\n"),
+        None if !on_screen => text.push_str("no landing verdict\n"),
         None => {}
     }
     // The last warning before a person approaches the vehicle.
@@ -223,7 +218,7 @@ pub fn closing(
     if model.log.dropped > 0 {
         let _ = writeln!(text, "log: {} records dropped", model.log.dropped);
     }
-    if let Ok(Some(path)) = log_path {
+    if let Ok(Some(path)) = log {
         if let Some(head) = model.book.short() {
             let signed = if model.book.is_signed { "signed" } else { "not signed (--key)" };
             let confirmed = model.book.confirmed;

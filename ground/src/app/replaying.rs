@@ -61,9 +61,8 @@ pub async fn session(
         Some(ReplayFrom::Phase(phase)) => {
             let found = player.seek_phase(phase);
             let has = player.recording().phases.iter().map(|(phase, _)| words::phase(*phase));
-            let (path, phase, has) =
-                (path.display(), words::phase(phase), has.collect::<Vec<_>>().join(", "));
-            anyhow::ensure!(found, "{path} has no phase {phase}; it has {has}");
+            let (path, has) = (path.display(), has.collect::<Vec<_>>().join(", "));
+            anyhow::ensure!(found, "{path} has no phase {}; it has {has}", words::phase(phase));
         }
     }
     if let Some(damage) = damage {
@@ -143,8 +142,7 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
             actions.extend(player.on_key(*key));
         }
     }
-    actions
-        .retain(|action| matches!(action, Action::Bell | Action::Redraw | Action::NextTheme | Action::Quit));
+    actions.retain(|one| matches!(one, Action::Bell | Action::Redraw | Action::NextTheme | Action::Quit));
     actions
 }
 

@@ -90,8 +90,8 @@ impl Screen {
         let voice =
             voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
-        let (terminal, writer) =
-            take_terminal().inspect_err(|_| restore()).context("preparing the terminal")?;
+        let taken = take_terminal().inspect_err(|_| restore());
+        let (terminal, writer) = taken.context("preparing the terminal")?;
         Ok(Self {
             terminal: ManuallyDrop::new(terminal),
             writer,

@@ -34,12 +34,8 @@ type ScreenMessages = FramedRead<OwnedReadHalf, LengthDelimitedCodec>;
 /// An event of the station's socket.
 #[derive(Debug)]
 pub enum ServerEvent {
-    /// A screen has attached.
-    ScreenJoined {
-        /// Its number and operator.
-        seat: Seat,
-        watch: bool,
-    },
+    /// A screen with this number and operator has attached.
+    ScreenJoined { seat: Seat, watch: bool },
     /// The screen with this number has left.
     ScreenLeft(u32),
     /// A request of a screen.

@@ -33,8 +33,10 @@ const TICK: Duration = Duration::from_millis(100);
 /// How often link rates are reported; they are means over ten seconds.
 const REPORT_EVERY: Duration = Duration::from_secs(1);
 
-/// The state of the run loop besides the model and the links.
+/// A station: its model, its links and everything that the run loop keeps beside them.
 pub(super) struct Station {
+    pub(super) model: Model,
+    pub(super) wire: Wire,
     pub(super) clock: Clock,
     pub(super) log_time: LogTime,
     pub(super) recorder: Option<Recorder>,
@@ -96,7 +98,7 @@ impl Answers {
         self.silence = self.silence.saturating_add(1);
     }
 
-    fn note_answer(&mut self) {
+    fn restart(&mut self) {
         *self = Self { ever: true, silence: 0 };
     }
 }
@@ -114,21 +116,21 @@ impl Station {
     ///
     /// # Errors
     /// The terminal failed, and the station does not outlive its screen.
-    pub(super) async fn run(&mut self, model: &mut Model, wire: &mut Wire) -> anyhow::Result<()> {
+    pub(super) async fn run(&mut self) -> anyhow::Result<()> {
         let mut signals = Signals::listen()?;
         let mut ticks = interval(TICK);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
-        self.report_crew(model, wire);
+        self.report_crew();
         loop {
             let redraw_at = self.output.redraw_at();
             let (demo, server) = (&mut self.demo, &mut self.server);
-            let wakes_at = model.wakes_at();
+            let wakes_at = self.model.wakes_at();
             let msgs = tokio::select! {
                 // The order matters. Keys come before the clock, because a waiting key may show
                 // that Ctrl-X is held. The link comes last, because it can be busy all the time.
                 biased;
                 signal = signals.next() => vec![Msg::Terminate(signal)],
-                Some(event) = OptionFuture::from(server.as_mut().map(Server::next)) => self.on_server_event(event, model),
+                Some(event) = OptionFuture::from(server.as_mut().map(Server::next)) => self.on_server_event(event),
                 msg = self.output.input() => vec![msg],
                 () = self.clock.sleep_until(wakes_at) => vec![Msg::Tick],
                 Some(failure) = OptionFuture::from(demo.as_mut().map(Demo::ended)) => {
@@ -136,43 +138,43 @@ impl Station {
                 }
                 _ = ticks.tick() => {
                     let now = self.clock.now();
-                    self.output.pass(model, now);
+                    self.output.pass(&mut self.model, now);
                     self.count_silence(now);
-                    self.report_crew(model, wire);
-                    self.take_outcomes(model, wire);
-                    self.tick_msgs(model)
+                    self.report_crew();
+                    self.take_outcomes();
+                    self.tick_msgs()
                 }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
-                received = wire.receive() => wire.take(received),
+                received = self.wire.receive() => self.wire.take(received),
             };
             let mut next = Next::Go;
-            let woken = wire.note_awake();
-            let report = if self.is_report_due(&msgs) { wire.report() } else { Vec::new() };
+            let woken = self.wire.note_awake();
+            let report = if self.is_report_due(&msgs) { self.wire.report() } else { Vec::new() };
             for msg in woken.into_iter().chain(report).chain(msgs) {
                 let msg = match msg {
                     Msg::Terminate("SIGHUP" | screen::TERMINAL_LOST) if self.outlives_its_screen() => {
-                        self.lose_screen(Lines::closed(), model).await;
+                        self.lose_screen(Lines::closed()).await;
                         Msg::ScreenLost
                     }
                     msg => msg,
                 };
-                self.output.mark_message(&msg, model);
-                next = next.max(self.step(model, wire, msg));
+                self.output.mark_message(&msg, &self.model);
+                next = next.max(self.step(msg));
             }
             if next == Next::LeaveScreen {
-                self.lose_screen(Lines::new_events_only(model), model).await;
-                next = self.step(model, wire, Msg::ScreenQuit);
+                self.lose_screen(Lines::new_events_only(&self.model)).await;
+                next = self.step(Msg::ScreenQuit);
             }
             let now = self.clock.now();
-            if let Err(error) = self.output.show(model, now, now) {
+            if let Err(error) = self.output.show(&self.model, now, now) {
                 if !self.outlives_its_screen() {
                     return Err(error);
                 }
-                self.lose_screen(Lines::closed(), model).await;
-                next = next.max(self.step(model, wire, Msg::ScreenLost));
+                self.lose_screen(Lines::closed()).await;
+                next = next.max(self.step(Msg::ScreenLost));
             }
-            self.report_crew(model, wire);
-            self.rotate_log(model);
+            self.report_crew();
+            self.rotate_log();
             if next == Next::Quit {
                 return Ok(());
             }
@@ -183,13 +185,14 @@ impl Station {
         self.screens.iter_mut().for_each(|screen| screen.answers.tick());
         self.local_screen.tick();
         if self.output.answers(now) {
-            self.local_screen.note_answer();
+            self.local_screen.restart();
         }
     }
 
     /// Reports who can command, if that has changed.
-    fn report_crew(&mut self, model: &mut Model, wire: &mut Wire) {
-        let local_screen = self.output.screen.is_some().then_some((&model.settings.seat, &self.local_screen));
+    fn report_crew(&mut self) {
+        let local_screen =
+            self.output.screen.is_some().then_some((&self.model.settings.seat, &self.local_screen));
         let attached = self.screens.iter().filter(|screen| !screen.watch);
         let all = local_screen.into_iter().chain(attached.map(|screen| (&screen.seat, &screen.answers)));
         let (mut seats, mut silent) = (Vec::new(), Vec::new());
@@ -200,8 +203,8 @@ impl Station {
                 seats.push(seat.clone());
             }
         }
-        if seats != model.crew.seats() || silent != model.crew.silent() {
-            self.step(model, wire, Msg::Crew { seats, silent });
+        if seats != self.model.crew.seats() || silent != self.model.crew.silent() {
+            self.step(Msg::Crew { seats, silent });
         }
     }
 
@@ -227,17 +230,17 @@ impl Station {
     }
 
     /// Continues without the full screen, and serves attached screens from now on.
-    async fn lose_screen(&mut self, lines: Lines, model: &Model) {
+    async fn lose_screen(&mut self, lines: Lines) {
         self.output = Output::lines(lines);
         if self.server.is_none() {
             // If another station uses the path, this one continues without a socket.
-            self.server = Server::open(self.socket.as_deref(), hello(model), 2).await.ok();
-            self.publish_checklist(model, self.clock.now());
+            self.server = Server::open(self.socket.as_deref(), hello(&self.model), 2).await.ok();
+            self.publish_checklist();
         }
     }
 
     /// Handles an event from the socket.
-    fn on_server_event(&mut self, event: ServerEvent, model: &Model) -> Vec<Msg> {
+    fn on_server_event(&mut self, event: ServerEvent) -> Vec<Msg> {
         match event {
             ServerEvent::ScreenJoined { seat, watch } => {
                 self.screens.push(Attached { seat, watch, answers: Answers::default() });
@@ -247,16 +250,13 @@ impl Station {
                 return vec![Msg::Requested { request, by }];
             }
             ServerEvent::FromScreen(by, ToStation::Here) => {
-                self.screens
-                    .iter_mut()
-                    .filter(|one| one.seat == by)
-                    .for_each(|one| one.answers.note_answer());
+                self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.restart());
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));
             }
             ServerEvent::Question(ToStation::Stop { force, operator }, answer) => {
-                let reply = stations::stopping(model, force, self.clock.now());
+                let reply = stations::stopping(&self.model, force, self.clock.now());
                 let stops = matches!(reply, ToScreen::Stopping { stops: true, .. });
                 let ending = if stops { "ends" } else { "refused" };
                 self.record_operator("stop", &operator, format!("requested by {operator}: {ending}"));
@@ -267,7 +267,7 @@ impl Station {
                 }
             }
             ServerEvent::Question(_, answer) => {
-                let _ = answer.send(ToScreen::Status(stations::of(model, &self.screens)));
+                let _ = answer.send(ToScreen::Status(stations::of(&self.model, &self.screens)));
             }
             ServerEvent::FromScreen(..) => {}
         }
@@ -296,7 +296,7 @@ impl Station {
     }
 
     /// Handles the outcomes of the jobs beside the loop.
-    pub(super) fn take_outcomes(&mut self, model: &mut Model, wire: &mut Wire) {
+    pub(super) fn take_outcomes(&mut self) {
         if let Some(error) = self.alarm_failure.as_ref().and_then(|failure| failure.try_recv().ok()?) {
             self.give_up_alarm_command(&error);
         }
@@ -304,11 +304,11 @@ impl Station {
         while let Some(outcome) = self.background.outcome() {
             match outcome {
                 Outcome::Written => {}
-                Outcome::NotWritten(target, error) => self.report_not_written(target, &error, model),
+                Outcome::NotWritten(target, error) => self.report_not_written(target, &error),
                 Outcome::LogFiles(found) => {
                     self.recorder.iter().for_each(|present| self.log_watch.take(&found, present, now));
                 }
-                Outcome::NextLog(next) => self.change_log(next, model, wire),
+                Outcome::NextLog(next) => self.change_log(next),
             }
         }
         if let Some(log) = self.recorder.clone().filter(|_| self.log_watch.begins()) {
@@ -316,23 +316,23 @@ impl Station {
         }
     }
 
-    fn report_not_written(&mut self, target: Target, error: &anyhow::Error, model: &mut Model) {
+    fn report_not_written(&mut self, target: Target, error: &anyhow::Error) {
         let now = self.clock.now();
         if let Target::Signature(_) = target {
-            model.warn(now, format!("the checklist is not stored for a restart: {error:#}"));
+            self.model.warn(now, format!("the checklist is not stored for a restart: {error:#}"));
         } else if !std::mem::replace(&mut self.not_saved, true) {
-            model.warn(now, format!("not stored for a restart: {error:#}"));
+            self.model.warn(now, format!("not stored for a restart: {error:#}"));
         }
     }
 
-    fn tick_msgs(&mut self, model: &Model) -> Vec<Msg> {
+    fn tick_msgs(&mut self) -> Vec<Msg> {
         let health = self.recorder.as_ref().map_or_else(LogHealth::default, |recorder| LogHealth {
             dropped: recorder.dropped(),
             failed: !recorder.is_intact(),
             removed: self.log_watch.removed,
             space: self.log_watch.space,
         });
-        let health = (health != model.log).then_some(Msg::Log(health));
+        let health = (health != self.model.log).then_some(Msg::Log(health));
         let book = self.sign_book(false);
         let written = self.report.as_ref().and_then(|report| report.try_recv().ok()).map(Msg::Report);
         self.report.take_if(|_| written.is_some());
@@ -340,17 +340,17 @@ impl Station {
     }
 
     /// Applies one message to the model and executes the resulting actions.
-    pub(super) fn step(&mut self, model: &mut Model, wire: &mut Wire, msg: Msg) -> Next {
+    pub(super) fn step(&mut self, msg: Msg) -> Next {
         let now = self.clock.now();
         let mut next = Next::Go;
         self.publish(&msg, now);
-        for action in update(model, msg, now) {
+        for action in update(&mut self.model, msg, now) {
             match action {
                 Action::Send(message) => {
-                    let sent = wire.send(&message, boot_of(model));
+                    let sent = self.wire.send(&message, boot_of(&self.model));
                     self.publish(&sent, now);
                     // Only updates counters; it returns no actions.
-                    update(model, sent, now);
+                    update(&mut self.model, sent, now);
                 }
                 Action::Record(record) => {
                     if matches!(record, Record::Event(_)) {
@@ -360,14 +360,14 @@ impl Station {
                 }
                 Action::StorePlace(place) => {
                     let target = Target::Position(place.boot);
-                    self.save(target, model, move |folder| files::write_place(folder, &place));
+                    self.save(target, move |folder| files::write_place(folder, &place));
                 }
                 Action::StoreUnfinished(unfinished) => {
                     let write = move |folder: &Path| files::write_unfinished(folder, &unfinished);
-                    self.save(Target::Unfinished, model, write);
+                    self.save(Target::Unfinished, write);
                 }
                 Action::Enter(line) => self.enter(&line),
-                Action::StoreChecklist(entry) => self.store_checklist(model, &entry, now),
+                Action::StoreChecklist(entry) => self.store_checklist(&entry),
                 Action::RefuseSignature(why) => self.publish(&Msg::SignRefused(why), now),
                 Action::SyncLog => {
                     if let Some(recorder) = &self.recorder {
@@ -375,13 +375,13 @@ impl Station {
                     }
                 }
                 Action::Redraw | Action::NextTheme | Action::Bell | Action::CallOut(_) => {
-                    self.output.act(&action, model, now);
+                    self.output.act(&action, &mut self.model, now);
                 }
                 Action::Alarm(words) => self.run_alarm_command(&words),
-                Action::WriteReport => self.write_report(model, now),
+                Action::WriteReport => self.write_report(now),
                 Action::MovePin(out) => self.demo.iter().for_each(|demo| demo.move_pin(out)),
                 Action::Request(request) => {
-                    self.publish(&Msg::Requested { request, by: model.settings.seat.clone() }, now);
+                    self.publish(&Msg::Requested { request, by: self.model.settings.seat.clone() }, now);
                 }
                 Action::LeaveScreen => next = next.max(Next::LeaveScreen),
                 Action::Quit => next = Next::Quit,
@@ -390,62 +390,51 @@ impl Station {
         next
     }
 
-    fn write_report(&mut self, model: &mut Model, now: Duration) {
+    fn write_report(&mut self, now: Duration) {
         let Some(log) = self.recorder.as_ref().map(|recorder| recorder.path().to_owned()) else { return };
         match programs::in_a_thread("report", move || programs::write_report(&log)) {
             Ok(writing) => self.report = Some(writing),
-            Err(why) => model.warn(now, format!("no report: {why}")),
+            Err(why) => self.model.warn(now, format!("no report: {why}")),
         }
     }
 
     /// Has a file written into the folder of the log.
-    fn save(
-        &mut self,
-        target: Target,
-        model: &mut Model,
-        write: impl FnOnce(&Path) -> anyhow::Result<()> + Send + 'static,
-    ) {
-        let Some(folder) = self.recorder.as_ref().and_then(|recorder| recorder.path().parent()) else {
-            return;
-        };
+    fn save(&mut self, target: Target, write: impl FnOnce(&Path) -> anyhow::Result<()> + Send + 'static) {
+        let Some(folder) = self.recorder.as_ref().and_then(|log| log.path().parent()) else { return };
         let folder = folder.to_owned();
-        self.queue(target, model, move || write(&folder));
+        self.queue(target, move || write(&folder));
     }
 
     /// Queues a file for the disk.
-    fn queue(
-        &mut self,
-        target: Target,
-        model: &mut Model,
-        write: impl FnOnce() -> anyhow::Result<()> + Send + 'static,
-    ) {
+    fn queue(&mut self, target: Target, write: impl FnOnce() -> anyhow::Result<()> + Send + 'static) {
         let write = move || match write() {
             Ok(()) => Outcome::Written,
             Err(error) => Outcome::NotWritten(target, error),
         };
         if !self.background.queue(target, write) {
-            self.report_not_written(target, &anyhow::anyhow!("the disk is too slow"), model);
+            self.report_not_written(target, &anyhow::anyhow!("the disk is too slow"));
         }
     }
 
     /// Sends every screen the state stored before this run: the checklist, the last position, the
     /// unfinished state.
-    pub(super) fn publish_stored(&mut self, model: &Model, now: Duration) {
-        if let Some(unfinished) = &model.stored_unfinished {
-            self.publish(&Msg::Unfinished(Box::new(unfinished.clone())), now);
+    pub(super) fn publish_stored(&mut self) {
+        let now = self.clock.now();
+        if let Some(unfinished) = self.model.stored_unfinished.clone() {
+            self.publish(&Msg::Unfinished(Box::new(unfinished)), now);
         }
-        self.publish_checklist(model, now);
-        if let Some(place) = model.place {
+        self.publish_checklist();
+        if let Some(place) = self.model.place {
             self.publish(&Msg::Place(Box::new(place)), now);
         }
     }
 
     /// Opens the book of this log, if there is one. `after` names the log before it.
-    pub(super) fn open_book(&mut self, model: &Model, after: &str) {
+    pub(super) fn open_book(&mut self, after: &str) {
         if self.recorder.is_none() {
             return;
         }
-        let Settings { us, vehicle, key_owner, mission, .. } = &model.settings;
+        let Settings { us, vehicle, key_owner, mission, .. } = &self.model.settings;
         let owner = key_owner.as_ref().map_or_else(
             || "no operator's key".to_owned(),
             |owner| format!("key {} of {}", owner.number, owner.name),
@@ -458,9 +447,8 @@ impl Station {
         let (book, first) = StationBook::open(self.next_log.book_key.clone(), &about, self.clock.unix_ns());
         self.book = Some(book);
         self.record(first);
-        for (name, role) in &model.settings.crew_roles {
-            let text = role_name(*role);
-            self.enter(&BookLine { kind: "crew".to_owned(), who: name.clone(), text });
+        for (who, role) in self.model.settings.crew_roles.clone() {
+            self.enter(&BookLine { kind: "crew".to_owned(), who, text: role_name(role) });
         }
     }
 
@@ -483,15 +471,16 @@ impl Station {
     }
 
     /// Closes the book. Its end is sent to the vehicle without waiting for an answer.
-    pub(super) fn close_book(&mut self, why: &str, model: &mut Model, wire: &mut Wire) {
+    pub(super) fn close_book(&mut self, why: &str) {
         let (kind, text) = (CLOSED.to_owned(), why.to_owned());
         self.enter(&BookLine { kind, who: String::new(), text });
         let Some(msg) = self.sign_book(true) else { return };
         self.book = None;
-        self.step(model, wire, msg);
-        let Some(head) = model.book.head else { return };
+        self.step(msg);
+        let Some(head) = self.model.book.head else { return };
+        let head = MavMessage::TD_BOOK_HEAD(head.message(self.model.settings.vehicle));
         for _ in 0..BOOK_END_REPEATS {
-            wire.send(&MavMessage::TD_BOOK_HEAD(head.message(model.settings.vehicle)), boot_of(model));
+            self.wire.send(&head, boot_of(&self.model));
         }
     }
 
@@ -516,27 +505,27 @@ impl Station {
     }
 
     /// Stores a change of the checklist, and shows it on every screen.
-    fn store_checklist(&mut self, model: &mut Model, entry: &ChecklistEntry, now: Duration) {
+    fn store_checklist(&mut self, entry: &ChecklistEntry) {
         if let Some(file) = self.signatures.clone() {
             let entry = entry.clone();
             self.signed += 1;
-            self.queue(Target::Signature(self.signed), model, move || {
+            self.queue(Target::Signature(self.signed), move || {
                 file.lock().unwrap_or_else(PoisonError::into_inner).add(&entry)
             });
         }
-        self.publish_checklist(model, now);
+        self.publish_checklist();
     }
 
     /// Sends every screen the checklist.
-    fn publish_checklist(&mut self, model: &Model, now: Duration) {
-        if let Some(list) = &model.checklist {
-            self.publish(&Msg::Checklist(Box::new(list.clone())), now);
+    fn publish_checklist(&mut self) {
+        if let Some(list) = self.model.checklist.clone() {
+            self.publish(&Msg::Checklist(Box::new(list)), self.clock.now());
         }
     }
 
-    /// Restores the terminal first, because the rest may take a while.
-    pub(super) async fn close(self, model: &mut Model) {
-        let Self { background, demo, next_log, mut output, clock, .. } = self;
+    /// Restores the terminal first, because the rest may take a while. Returns the last state.
+    pub(super) async fn close(self) -> Model {
+        let Self { mut model, background, demo, next_log, mut output, clock, .. } = self;
         // Lets the socket send its last answers.
         tokio::task::yield_now().await;
         let had_screen = output.screen.take().is_some();
@@ -551,13 +540,14 @@ impl Station {
             }
         }
         if !had_screen {
-            output.lines.show(model);
+            output.lines.show(&model);
         }
         if let Some(demo) = demo {
             demo.stop().await;
         }
         // The end of the log before is written, too.
         let _ = next_log.ending.map(|ending| ending.recv());
+        model
     }
 }
 

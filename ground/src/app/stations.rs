@@ -34,8 +34,7 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
         false if vehicle.boot.is_simulated() => "SIM",
         false => "LIVE",
     };
-    let watching =
-        screens.iter().filter(|screen| screen.watch).map(|screen| format!("{} (watches)", screen.seat));
+    let watching = screens.iter().filter(|one| one.watch).map(|one| format!("{} (watches)", one.seat));
     let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
     let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
     let Address { system_id, component_id } = settings.vehicle;
@@ -70,9 +69,7 @@ async fn query(path: &Path, request: &ToStation) -> io::Result<ToScreen> {
         let (read, mut write) = socket::connect(path).await?.into_split();
         write.write_all(&encode_to_station(request)).await?;
         let bytes = messages(read).next().await.ok_or(ErrorKind::UnexpectedEof)??;
-        let (answer, _) =
-            decode_to_screen(&bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?;
-        Ok(answer)
+        Ok(decode_to_screen(&bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))?.0)
     };
     tokio::time::timeout(ANSWERS_WITHIN, exchange)
         .await
@@ -126,8 +123,7 @@ pub(super) async fn the_station(named: Option<&Path>) -> anyhow::Result<PathBuf>
 /// The only station over these links, for a screen that has lost its station.
 pub(super) async fn station_over(links: &str) -> Option<PathBuf> {
     let found = stations().await.ok()?;
-    let mut same =
-        found.into_iter().filter(|(_, status)| status.as_ref().is_ok_and(|status| status.link == links));
+    let mut same = found.into_iter().filter(|(_, of)| of.as_ref().is_ok_and(|of| of.link == links));
     same.next().filter(|_| same.next().is_none()).map(|(path, _)| path)
 }
 

@@ -17,7 +17,7 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::LinkAddress;
 
 use super::clock::{Clock, LogTime};
-use crate::model::{BOOT_EXPIRES_AFTER, LinkReport};
+use crate::model::{EXPIRES_AFTER, LinkReport};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
@@ -60,7 +60,7 @@ struct BootOrigins(Vec<(u32, Origin, Duration)>);
 impl BootOrigins {
     /// Stores the origin of a boot.
     fn note(&mut self, boot: u32, from: Origin, now: Duration) {
-        self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < BOOT_EXPIRES_AFTER);
+        self.0.retain(|(known, _, at)| *known != boot && now.saturating_sub(*at) < EXPIRES_AFTER);
         self.0.push((boot, from, now));
         self.0.drain(..self.0.len().saturating_sub(BOOTS_MAX));
     }
@@ -71,7 +71,7 @@ impl BootOrigins {
     /// Only other boots are received over this link.
     fn origin_of(&self, boot: u32, now: Duration) -> Result<Option<Origin>, OtherVehicles> {
         let source = self.0.iter().find(|(known, ..)| *known == boot).map(|(_, from, _)| *from);
-        let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < BOOT_EXPIRES_AFTER);
+        let others = self.0.iter().any(|(_, _, at)| now.saturating_sub(*at) < EXPIRES_AFTER);
         if source.is_none() && others && boot != 0 { Err(OtherVehicles) } else { Ok(source) }
     }
 }
@@ -169,10 +169,8 @@ impl Wire {
         let stalled = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
         (stalled >= STOOD_STILL).then(|| {
             self.old_until = now + WAITED_FOR;
-            let stood_s = stalled.as_secs();
-            Msg::LinkWarning(format!(
-                "this station stood still for {stood_s} s: what waited is in the log only"
-            ))
+            let (stood_s, waited) = (stalled.as_secs(), "what waited is in the log only");
+            Msg::LinkWarning(format!("this station stood still for {stood_s} s: {waited}"))
         })
     }
 
@@ -218,7 +216,7 @@ impl Wire {
                     }
                     self.note_boot(number, &frame, from);
                     if self.links.count() > 1 {
-                        msgs.push(Msg::ReceivedOver(number));
+                        msgs.push(Msg::OverLink(number));
                     }
                     if frame.source() == self.vehicle {
                         // On a link with one peer it is the same source after the line was opened
@@ -237,9 +235,8 @@ impl Wire {
                 // Counted and shown in the report of the link; a sender that is locked out is
                 // reported.
                 LinkEvent::Rejected(frame, why) => {
-                    msgs.extend(
-                        self.lockouts.refused(&frame, why, now.time, now.stamp).map(Msg::LinkWarning),
-                    );
+                    let lockout = self.lockouts.refused(&frame, why, now.time, now.stamp);
+                    msgs.extend(lockout.map(Msg::LinkWarning));
                 }
                 LinkEvent::Up(peer) => msgs.push(Msg::LinkUp(self.named(&name, peer))),
                 LinkEvent::Down(why) if self.links.each().all(|(_, link)| link.trouble().is_some()) => {
@@ -281,8 +278,8 @@ impl Wire {
         let frame = self.encoder.encode(message);
         let now = self.now();
         for number in 0..self.links.count() {
-            let to =
-                if concerns_all(message) { Ok(None) } else { self.boots[number].origin_of(boot, now.time) };
+            let origin = || self.boots[number].origin_of(boot, now.time);
+            let to = if concerns_all(message) { Ok(None) } else { origin() };
             // Only other vehicles are received over this link.
             let Ok(to) = to else { continue };
             let Self { links, recorder, log_time, sent_bytes, .. } = self;
@@ -389,7 +386,7 @@ impl Sources {
             self.numbers.push_back((source, self.next));
             self.next
         });
-        (std::mem::replace(&mut self.reported, number) != number).then_some(Msg::ReceivedFrom(number))
+        (std::mem::replace(&mut self.reported, number) != number).then_some(Msg::FromSource(number))
     }
 }
 

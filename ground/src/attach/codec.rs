@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use tokio::io::AsyncRead;
 use tokio_util::codec::{FramedRead, LengthDelimitedCodec};
 
-use super::{NOTE_MAX, OPERATOR_MAX, ToScreen, ToStation, VERSION};
-use crate::model::{Request, words::printable};
+use super::{OPERATOR_MAX, ToScreen, ToStation, VERSION};
+use crate::model::{NOTE_MAX, Request, words::printable};
 use crate::update::Msg;
 
 /// The longest accepted message, bytes.

@@ -20,8 +20,6 @@ use crate::update::Msg;
 pub const VERSION: u32 = 16;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
-/// The longest note, in characters: a line of the smallest terminal with its name.
-pub(crate) const NOTE_MAX: usize = 60;
 
 /// What the station is; the first message to a screen.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -39,14 +37,11 @@ pub enum ToScreen {
     Live,
     /// A message that the station has taken into its model.
     Msg(Msg),
+    /// The answer to a request for the status.
     Status(StationStatus),
-    /// The answer to a request to stop.
-    Stopping {
-        /// Whether the station stops.
-        stops: bool,
-        /// The reason, or where the log is.
-        words: String,
-    },
+    /// The answer to a request to stop: whether the station stops, and the reason, or where the log
+    /// is.
+    Stopping { stops: bool, words: String },
     /// The first message to a screen.
     Hello(Box<Hello>),
 }
@@ -81,12 +76,9 @@ pub enum ToStation {
     Hello { watch: bool, operator: String },
     /// Asks for the status; the only message.
     Status,
-    /// Asks the station to stop; the only message.
-    Stop {
-        /// Stop even while the vehicle is armed or in flight.
-        force: bool,
-        operator: String,
-    },
+    /// Asks the station to stop, with `force` even while the vehicle is armed or in flight; the
+    /// only message.
+    Stop { force: bool, operator: String },
     /// A request of the crew.
     Request(Request),
     /// A key was pressed; for the log.

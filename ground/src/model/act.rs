@@ -5,10 +5,10 @@
 
 use std::time::Duration;
 
+use super::quantity::{self, Quantity};
 use super::{
-    Model, Page, Role, Vehicle,
-    quantity::{self, Quantity},
-    why_not_arm, why_not_check, why_not_here, why_not_seen, why_not_start, why_not_take, words,
+    Model, Page, Role, Vehicle, why_not_arm, why_not_check, why_not_here, why_not_seen, why_not_start,
+    why_not_take, words,
 };
 use crate::key::Key;
 
@@ -79,69 +79,49 @@ enum Effect {
     Acts,
 }
 
-const fn shows(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Shows, act, name, key: Key::Char(key), words }
+const fn row(effect: Effect, act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
+    Definition { effect, act, name, key: Key::Char(key), words }
 }
 
-const fn confirms(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Confirms, act, name, key: Key::Char(key), words }
-}
-
-const fn commands(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Commands, act, name, key: Key::Char(key), words }
-}
-
-const fn acts(act: Act, name: &'static str, key: char, words: &'static str) -> Definition {
-    Definition { effect: Effect::Acts, act, name, key: Key::Char(key), words }
-}
+use Effect::{Acts, Commands, Confirms, Shows};
 
 /// Every action; the most important first.
 pub const DEFINITIONS: [Definition; 35] = [
-    confirms(Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
-    confirms(Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
-    confirms(Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
-    confirms(Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
-    commands(Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
-    confirms(Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
-    confirms(Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
-    confirms(Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
-    confirms(
-        Act::Seen,
-        "moved-right",
-        'Y',
-        "I saw every surface move as the page x says: then SEEN and Enter",
-    ),
-    commands(Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
-    acts(Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
-    shows(Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
-    confirms(Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
-    confirms(Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
-    shows(Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
-    shows(Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
-    shows(Act::Show(Page::Landing), "landing", '3', "page: the burn"),
-    shows(Act::Show(Page::Review), "review", '4', "page: verdict, limits, what went wrong"),
-    shows(Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
-    shows(Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
-    shows(Act::Show(Page::Log), "log", '7', "page: the recording"),
-    shows(Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
-    shows(Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
-    shows(
-        Act::Show(Page::Checks),
-        "checks",
-        'x',
-        "page: checks on the pad, radio range, battery and storage",
-    ),
-    shows(Act::Show(Page::Plot), "plot", 't', "page: every number, and one of them over time"),
-    shows(Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
-    shows(Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
-    shows(Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
-    shows(Act::Palette, "palette", ':', "list every action; type a part of its words"),
-    shows(Act::Note, "note", 'n', "a note into log and book: type it, then Enter"),
-    shows(Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
-    acts(Act::Report, "report", 'W', "write the report of the flight beside the log"),
-    acts(Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
-    Definition { key: Key::CtrlL, ..shows(Act::Redraw, "redraw", ' ', "draw the screen again") },
-    acts(Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
+    row(Confirms, Act::Arm, "arm", 'A', "arm: then type ARM and Enter within 10 s"),
+    row(Confirms, Act::Start, "start", 'S', "start the countdown: then type START and Enter within 10 s"),
+    row(Confirms, Act::Disarm, "disarm", 'D', "disarm: then Enter within 5 s"),
+    row(Confirms, Act::HoldCountdown, "hold-countdown", 'H', "hold the countdown: then Enter within 5 s"),
+    row(Commands, Act::Tap, "tap", 'T', "two people: tap twice a second, from the start to the release"),
+    row(Confirms, Act::TakeCommand, "take", 'C', "take command from a silent station: then TAKE and Enter"),
+    row(Confirms, Act::Check, "check", 'X', "check the vehicle: then Enter; fins and gimbal MOVE"),
+    row(Confirms, Act::CheckStill, "check-still", 'E', "the same check without motion: then Enter"),
+    row(Confirms, Act::Seen, "moved-right", 'Y', "every surface moved as page x says: then SEEN and Enter"),
+    row(Commands, Act::RangeTest, "range-test", 'U', "radio range test: 30 s, nothing is commanded"),
+    row(Acts, Act::Acknowledge, "acknowledge", ' ', "acknowledge the shown alarm"),
+    row(Shows, Act::Checklist, "checklist", 'k', "the checklist on the Pad page; Up and Down choose a step"),
+    row(Confirms, Act::SignStep, "sign", 'G', "sign the chosen step of the checklist: then Enter within 5 s"),
+    row(Confirms, Act::VoidStep, "void", 'V', "take a step's signature back: then Enter within 5 s"),
+    row(Shows, Act::Show(Page::Pad), "pad", '1', "page: arming checks and ladder"),
+    row(Shows, Act::Show(Page::Descent), "flight", '2', "page: ascent and descent"),
+    row(Shows, Act::Show(Page::Landing), "landing", '3', "page: the burn"),
+    row(Shows, Act::Show(Page::Review), "review", '4', "page: verdict, limits, what went wrong"),
+    row(Shows, Act::Show(Page::Link), "link", '5', "page: link rates and the age of every message"),
+    row(Shows, Act::Show(Page::Messages), "texts", '6', "page: events and messages"),
+    row(Shows, Act::Show(Page::Log), "log", '7', "page: the recording"),
+    row(Shows, Act::Show(Page::Alarms), "alarms", '8', "page: every alarm"),
+    row(Shows, Act::Show(Page::Find), "find", 'f', "page: where to look for the vehicle, and the way there"),
+    row(Shows, Act::Show(Page::Checks), "checks", 'x', "page: pad checks, radio range, battery and storage"),
+    row(Shows, Act::Show(Page::Plot), "plot", 't', "page: every number, and one of them over time"),
+    row(Shows, Act::Show(Page::Help), "help", '?', "page: the keys that work now"),
+    row(Shows, Act::Hold, "hold", 'h', "hold this page, or follow the flight again"),
+    row(Shows, Act::Follow, "follow", '0', "follow the flight again (Esc does too)"),
+    row(Shows, Act::Palette, "palette", ':', "list every action; type a part of its words"),
+    row(Shows, Act::Note, "note", 'n', "a note into log and book: type it, then Enter"),
+    row(Shows, Act::NextTheme, "theme", 'c', "colours: dark, light for sunlight, none"),
+    row(Acts, Act::Report, "report", 'W', "write the report of the flight beside the log"),
+    row(Acts, Act::MovePin, "pin", 'I', "demonstration: put the vehicle's pin in, or pull it, by hand"),
+    Definition { key: Key::CtrlL, ..row(Shows, Act::Redraw, "redraw", ' ', "draw the screen again") },
+    row(Acts, Act::Quit, "quit", 'q', "quit; while it is not over: then type QUIT and Enter"),
 ];
 
 /// Why no flight can be shown again or reported here now.
@@ -164,7 +144,7 @@ impl Act {
             Self::Start => acts && why_not_start(model, now).is_none(),
             Self::Disarm => acts && model.every_vehicle(now).any(|v| v.is_armed() && !v.in_flight()),
             Self::HoldCountdown => commands && model.every_vehicle(now).any(Vehicle::counts_down),
-            Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.operator_number()),
+            Self::Tap => acts && model.tapping(now).is_some_and(|(by, _)| by == model.seat_key()),
             Self::TakeCommand => acts && why_not_take(model, now).is_none(),
             Self::Note => commands,
             Self::RangeTest => commands && why_not_check(model, now).is_none(),

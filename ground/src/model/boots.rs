@@ -20,7 +20,7 @@ const OVERLAP_MS: i64 = 500;
 /// are two clocks.
 const LINKS_APART_MS: i64 = 2_000;
 /// Silence after which one of several vehicles under an id is removed.
-pub const BOOT_EXPIRES_AFTER: Duration = Duration::from_secs(10);
+pub const EXPIRES_AFTER: Duration = Duration::from_secs(10);
 /// Silence after which the next boot from the same source is a reset of the shown vehicle: twenty
 /// reports on a network, and more than one on the slowest line.
 const RESET_AFTER: Duration = Duration::from_secs(2);
@@ -37,7 +37,7 @@ const SOURCES_MAX: usize = 4;
 const NEAR_MS: i64 = 500;
 /// Maximum age of the last report from a source that a boot still uses.
 const ALIVE_WITHIN: Duration = Duration::from_secs(2);
-/// Number of contradictions of clock and sequence number within [`BOOT_EXPIRES_AFTER`] that prove
+/// Number of contradictions of clock and sequence number within [`EXPIRES_AFTER`] that prove
 /// two vehicles.
 const CONTRADICTIONS: usize = 3;
 
@@ -122,8 +122,8 @@ impl TrackedBoot {
         (self.number ^ number) & LARGEST_BOOT_NUMBER == 0
     }
 
-    fn is_received(&self, now: Duration) -> bool {
-        is_within(self.received_at, BOOT_EXPIRES_AFTER, now)
+    fn is_alive(&self, now: Duration) -> bool {
+        is_within(self.received_at, EXPIRES_AFTER, now)
     }
 
     /// Difference between a clock reading and this boot's extrapolated clock, ms.
@@ -211,7 +211,7 @@ impl TrackedBoot {
     /// Whether two vehicles speak with this unique id and this boot: a copied memory card.
     fn is_of_two(&self, now: Duration) -> bool {
         let contradicts = self.contradicted_at.len() == CONTRADICTIONS
-            && self.contradicted_at.iter().all(|at| is_within(*at, BOOT_EXPIRES_AFTER, now));
+            && self.contradicted_at.iter().all(|at| is_within(*at, EXPIRES_AFTER, now));
         let clocks = || self.sources.iter().filter(|source| source.reports > 5).map(|source| source.began_ms);
         let apart_ms = clocks().max().zip(clocks().min()).map_or(0, |(last, first)| last - first);
         contradicts || apart_ms > LINKS_APART_MS
@@ -305,7 +305,7 @@ impl Boots {
     ) -> Option<BootId> {
         let shown = self.shown_boot()?;
         let named = |boot: &TrackedBoot| number.is_some_and(|number| boot.is_number(number));
-        let here = |boot: &TrackedBoot| boot.is_received(now) && boot.is_at(source);
+        let here = |boot: &TrackedBoot| boot.is_alive(now) && boot.is_at(source);
         if let Some(only) = self.only(named).or_else(|| self.only(here)) {
             return Some(only);
         }
@@ -344,16 +344,15 @@ impl Boots {
     /// while idle, by one from the same source that is armed or flies.
     pub fn settle(&mut self, now: Duration) -> Option<BootId> {
         let shown = self.shown_boot()?;
-        let chosen =
-            self.chosen.and_then(|id| self.of(id)).filter(|boot| boot.is_received(now)).map(|boot| boot.id);
+        let chosen = self.chosen.filter(|id| self.of(*id).is_some_and(|boot| boot.is_alive(now)));
         let silence = now.saturating_sub(shown.received_at);
         let takes = |boot: &&TrackedBoot| {
             let reports = boot.reports_at.iter().filter(|at| **at > shown.received_at).count();
             let near = boot.shares_a_source(shown);
-            let after = if near && boot.follows(shown) { RESET_AFTER } else { BOOT_EXPIRES_AFTER };
+            let after = if near && boot.follows(shown) { RESET_AFTER } else { EXPIRES_AFTER };
             let is_alone = silence >= after && reports > 1;
             boot.id != shown.id
-                && boot.is_received(now)
+                && boot.is_alive(now)
                 && (is_alone || (near && boot.is_busy && !shown.is_busy && boot.is_steady(now)))
         };
         let next = chosen.unwrap_or_else(|| {
@@ -368,20 +367,20 @@ impl Boots {
     /// Selects this boot by its number. Returns false if it is not received, or not the only one of
     /// its number.
     pub fn choose(&mut self, number: u32, now: Duration) -> bool {
-        let only = self.only(|boot| boot.number == number && boot.is_received(now));
+        let only = self.only(|boot| boot.number == number && boot.is_alive(now));
         self.chosen = only.or(self.chosen);
         only.is_some()
     }
 
     /// Other vehicles received beside the shown one.
     pub fn beside(&self, now: Duration) -> Vec<Beside> {
-        let Some(shown) = self.shown_boot().filter(|shown| shown.is_received(now)) else { return Vec::new() };
+        let Some(shown) = self.shown_boot().filter(|shown| shown.is_alive(now)) else { return Vec::new() };
         let is_other = |boot: &&TrackedBoot| {
             let is_same = boot.shares_a_source(shown) && (boot.follows(shown) || shown.follows(boot));
-            boot.id != shown.id && boot.is_received(now) && !is_same
+            boot.id != shown.id && boot.is_alive(now) && !is_same
         };
         let others = self.list.iter().filter(is_other).map(|boot| Beside::Boot(boot.id, boot.number));
-        let twin = self.list.iter().any(|boot| boot.is_received(now) && boot.is_of_two(now));
+        let twin = self.list.iter().any(|boot| boot.is_alive(now) && boot.is_of_two(now));
         others.chain(twin.then_some(Beside::Twin)).collect()
     }
 
@@ -389,8 +388,7 @@ impl Boots {
     /// has a number that no other one has.
     pub fn is_chosen(&self, now: Duration) -> bool {
         let Some(shown) = self.shown_boot() else { return false };
-        let same =
-            self.list.iter().filter(|boot| boot.number == shown.number && boot.is_received(now)).count();
+        let same = self.list.iter().filter(|boot| boot.number == shown.number && boot.is_alive(now)).count();
         self.chosen == self.shown && shown.number > 0 && same == 1 && !shown.is_of_two(now)
     }
 
@@ -405,16 +403,14 @@ impl Boots {
 impl Model {
     /// The vehicles received beside the shown one, in words; `None` if it is alone.
     pub fn beside(&self, now: Duration) -> Option<String> {
-        let is_received = |at: Duration| is_within(at, BOOT_EXPIRES_AFTER, now);
-        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_received(status.received_at));
-        let foreign =
-            self.vehicle.foreign.as_ref().filter(|foreign| ours && is_received(foreign.received_at));
+        let is_alive = |at: Duration| is_within(at, EXPIRES_AFTER, now);
+        let ours = self.vehicle.status.as_ref().is_some_and(|status| is_alive(status.received_at));
+        let foreign = self.vehicle.foreign.as_ref().filter(|foreign| ours && is_alive(foreign.received_at));
         let words = self.boots.beside(now).into_iter().map(|other| match other {
             Beside::Boot(_, 0) => "one without a boot number".to_owned(),
             Beside::Boot(id, boot) => {
-                let state =
-                    self.others.get(&id).map_or_else(String::new, |of| format!(" {}", state_words(of)));
-                format!("boot {}{state}", words::boot(boot))
+                let state = self.others.get(&id).map(|of| format!(" {}", state_words(of)));
+                format!("boot {}{}", words::boot(boot), state.unwrap_or_default())
             }
             Beside::Twin => "another one with the same boot and unique id".to_owned(),
         });
@@ -454,7 +450,7 @@ impl Model {
         let received = self
             .others
             .iter()
-            .filter(move |(id, _)| self.boots.age(**id, now).is_some_and(|age| age < BOOT_EXPIRES_AFTER));
+            .filter(move |(id, _)| self.boots.age(**id, now).is_some_and(|age| age < EXPIRES_AFTER));
         std::iter::once(&self.vehicle).chain(received.map(|(_, vehicle)| vehicle))
     }
 }

@@ -9,11 +9,8 @@ use protocol::text::shown;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
-use super::{
-    FlownMission, Model,
-    quantity::{self, Quantity},
-    words,
-};
+use super::quantity::{self, Quantity};
+use super::{FlownMission, Model, words};
 
 /// The most steps of a checklist.
 pub const STEPS_MAX: usize = 40;
@@ -144,14 +141,10 @@ mod role_words {
 /// A change of a checklist, for the file of its signatures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum ChecklistEntry {
-    Marked {
-        step: usize,
-        mark: Mark,
-    },
+    /// A step was signed, or its signature taken back.
+    Marked { step: usize, mark: Mark },
     /// The vehicle has left the pad: every step is open for the next flight.
-    Flown {
-        unix_s: u64,
-    },
+    Flown { unix_s: u64 },
 }
 
 impl Checklist {
@@ -197,9 +190,8 @@ impl Model {
     /// How many steps of the checklist are done, and of how many; `None` without a checklist.
     pub fn steps_done(&self, now: Duration) -> Option<(usize, usize)> {
         let checklist = self.checklist.as_ref()?;
-        let done =
-            checklist.steps.iter().filter(|step| self.step_state(step, now) == StepState::Done).count();
-        Some((done, checklist.steps.len()))
+        let is_done = |step: &&Step| self.step_state(step, now) == StepState::Done;
+        Some((checklist.steps.iter().filter(is_done).count(), checklist.steps.len()))
     }
 
     /// The first step that does not count yet.
@@ -225,9 +217,8 @@ impl Model {
                     return Some(format!("the checklist is for {mission}, the vehicle flies {flies}"));
                 }
                 None => {
-                    return Some(format!(
-                        "the vehicle has not reported whether it flies {mission} (checklist)"
-                    ));
+                    let why = "the vehicle has not reported whether it flies";
+                    return Some(format!("{why} {mission} (checklist)"));
                 }
             }
         }

@@ -70,14 +70,12 @@ impl Vehicle {
 
     /// Stores its text about a check. Its flight status reports whether the check still fails.
     pub(crate) fn note_check_text(&mut self, text: &str) {
-        let text =
-            text.strip_prefix("not ready: ").or_else(|| text.strip_prefix("armed, and ")).unwrap_or(text);
+        let text = ["not ready: ", "armed, and "].iter().find_map(|of| text.strip_prefix(of)).unwrap_or(text);
         let text = text.split_once(" refused: ").map_or(text, |(_, reason)| reason);
         let Some(check) = check_of(text) else { return };
         self.checks.reported.retain(|(reported, _)| *reported != check);
         self.checks.reported.push((check, in_short(text, check)));
-        let holds =
-            self.status.as_ref().is_some_and(|status| status.value.hold == TdHold::TD_HOLD_CHECK_FAILED);
+        let holds = self.reports(|status| status.hold == TdHold::TD_HOLD_CHECK_FAILED);
         self.checks.held = self.checks.held.or_else(|| holds.then_some(check));
     }
 

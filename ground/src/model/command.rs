@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
 use super::{
-    BOOT_EXPIRES_AFTER, FlownMission, LinkState, Model, PadCheck, Prompt, Proposal, RED_AFTER, Seat,
-    Settings, Vehicle, foreign_name, is_on_pad, words,
+    EXPIRES_AFTER, FlownMission, LinkState, Model, PadCheck, Prompt, Proposal, RED_AFTER, Seat, Settings,
+    Vehicle, foreign_name, is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little
@@ -149,7 +149,7 @@ pub enum Acknowledgement {
     /// The vehicle is executing the command.
     InProgress,
     /// Accepted by the vehicle as a request that a second person has to confirm.
-    AwaitsConfirmation,
+    Proposed,
     /// Answered with this `MAV_RESULT`.
     Answered(u8),
     /// No answer came, and none is expected any more.
@@ -237,7 +237,7 @@ pub fn why_nothing_moves(model: &Model, now: Duration) -> Option<String> {
         _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => {
             format!("TWO VEHICLES under id {}: switch one off", of.system_id)
         }
-        Some(foreign) if foreign.age(now) < BOOT_EXPIRES_AFTER => {
+        Some(foreign) if foreign.age(now) < EXPIRES_AFTER => {
             format!("not a Touchdown vehicle: {}", foreign_name(foreign))
         }
         _ if vehicle.status.is_none() => {
@@ -288,8 +288,7 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         })
         .or_else(|| model.vehicle.wait_before(now).map(|away| format!("do not approach{}", away.reason())))
         .or_else(|| {
-            (!uplink.is_proven(now))
-                .then(|| format!("the uplink is not proven: {}", uplink.why_not_received()))
+            (!uplink.is_proven(now)).then(|| format!("the uplink is not proven: {}", uplink.why_unproven()))
         })
         .or_else(|| why_no_key(model))
         .or_else(|| why_other_mission(model))
@@ -417,12 +416,12 @@ pub fn why_other_mission(model: &Model) -> Option<String> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum AutoStep {
     /// Waits until the checks pass; after a temporary refusal, also until this time.
-    WaitForReady {
-        not_before: Duration,
-    },
+    WaitForReady { not_before: Duration },
+    /// The command to arm was sent.
     WaitForArmed,
     /// The countdown runs. After a hold for a lost link it is started again.
     Started,
+    /// Nothing remains to be commanded.
     Done,
 }
 

@@ -170,7 +170,7 @@ impl Model {
     }
 
     /// The key number of the operator at this screen; 0 if that is not the key's owner.
-    pub fn operator_number(&self) -> u8 {
+    pub fn seat_key(&self) -> u8 {
         let is_owner = why_not_seat(self, &self.settings.seat).is_none();
         if is_owner || self.settings.seat.screen == 0 { self.key_number() } else { 0 }
     }
@@ -192,17 +192,13 @@ impl Model {
     pub fn proposal(&self, now: Duration) -> Option<Proposal> {
         let crew = self.vehicle.last::<TD_CREW_DATA>().filter(|crew| crew.age(now) <= CREW_VALID_FOR)?;
         let left = Duration::from_millis(crew.value.ask_left_ms.into()).saturating_sub(crew.age(now));
-        let waits = crew.value.act != TdAct::TD_ACT_NONE && !left.is_zero();
-        waits.then_some(Proposal {
-            act: crew.value.act,
-            number: crew.value.ask_number,
-            by: crew.value.asked_by,
-            left,
-        })
+        let TD_CREW_DATA { act, ask_number: number, asked_by: by, .. } = crew.value;
+        let waits = act != TdAct::TD_ACT_NONE && !left.is_zero();
+        waits.then_some(Proposal { act, number, by, left })
     }
 
     /// The proposal that our operator may confirm.
-    pub fn proposal_to_confirm(&self, now: Duration) -> Option<Proposal> {
+    pub fn open_proposal(&self, now: Duration) -> Option<Proposal> {
         let ours = self.key_number();
         let differs = |proposal: &Proposal| {
             proposal.by != ours

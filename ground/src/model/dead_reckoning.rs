@@ -11,9 +11,9 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdChute, TdHold, TdPhase};
+use protocol::dialect::{TdHold, TdPhase};
 
-use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Spot, Vehicle, is_burning};
+use super::{Change, GRAVITY_M_S2, Motion, NorthEastUp, Spot, Vehicle, hangs_on_its_chute, is_burning};
 
 /// Error of the last position, m: usual for a satellite receiver.
 pub(super) const POSITION_ERROR_M: f64 = 1.5;
@@ -66,7 +66,8 @@ pub fn predict_position(vehicle: &Vehicle, now: Duration) -> Option<PredictedPos
     let down_after_s = expected.landed_after_s.map(|landed_s| (1.0 + LATE_SHARE) * landed_s + LATE_S);
     let growing_s = down_after_s.map_or(seconds, |down_s| seconds.min(down_s));
     let wrong_m_s2 = acceleration_error_m_s2(vehicle, phase, expected.basis);
-    let swerved_m = swerve_m(expected.burning_s);
+    let swerving_s = expected.burning_s.min(SWERVE_S);
+    let swerved_m = SWERVE_M_S2 * swerving_s * (expected.burning_s - 0.5 * swerving_s);
     let grown_m = SPEED_ERROR_M_S * growing_s + 0.5 * wrong_m_s2 * growing_s * growing_s + swerved_m;
     let [north_m, east_m, altitude_m] = expected.place;
     Some(PredictedPosition {
@@ -143,8 +144,7 @@ pub fn is_silent(vehicle: &Vehicle, now: Duration) -> bool {
 
 /// Whether its canopy is open and carries it; on the ground it does not.
 fn is_carried(vehicle: &Vehicle) -> bool {
-    let open = vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN);
-    open && vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE)
+    hangs_on_its_chute(vehicle) && vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE)
 }
 
 fn acceleration_error_m_s2(vehicle: &Vehicle, phase: TdPhase, basis: Basis) -> f64 {
@@ -155,11 +155,6 @@ fn acceleration_error_m_s2(vehicle: &Vehicle, phase: TdPhase, basis: Basis) -> f
         TdPhase::TD_PHASE_CHUTE if !is_carried(vehicle) => OPENING_ERROR_M_S2,
         _ => STEERED_ERROR_M_S2,
     }
-}
-
-fn swerve_m(burning_s: f64) -> f64 {
-    let swerving_s = burning_s.min(SWERVE_S);
-    SWERVE_M_S2 * swerving_s * (burning_s - 0.5 * swerving_s)
 }
 
 /// Under thrust, the present position on the plan. Its points are evenly spaced in time and give
@@ -313,8 +308,7 @@ impl LastMotion {
         while passed_s < seconds {
             let step_s = STEP_S.min(seconds - passed_s);
             let start = self.acceleration_m_s2_at(&place, &velocity, &mut braking);
-            let halfway: NorthEastUp =
-                std::array::from_fn(|axis| velocity[axis] + 0.5 * start[axis] * step_s);
+            let halfway = std::array::from_fn(|axis| velocity[axis] + 0.5 * start[axis] * step_s);
             let acceleration = self.acceleration_m_s2_at(&place, &halfway, &mut braking);
             for axis in 0..3 {
                 place[axis] += (velocity[axis] + 0.5 * acceleration[axis] * step_s) * step_s;
@@ -394,7 +388,7 @@ fn size(vector: &NorthEastUp) -> f64 {
 mod tests {
     use super::*;
     use proptest::prelude::*;
-    use protocol::dialect::{MavMessage, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdLimit};
+    use protocol::dialect::{MavMessage, TD_DESCENT_DATA, TD_FLIGHT_STATUS_DATA, TdChute, TdLimit};
 
     use crate::model::{GRAVITY_M_S2, Heartbeat, Motion, Prediction, Sample, Touchdown};
 

@@ -39,23 +39,20 @@ pub enum Prompt {
     WithoutLog,
     /// Arm although no burn of the motor's lot has confirmed its curve.
     Untested,
+    /// Command the vehicle that another station has armed.
     TakeCommand,
+    /// Disarm on the pad.
     Disarm,
     /// Abort a vehicle with another autopilot, after the crew has read the effect there.
     AbortForeign,
     /// Hold the countdown.
     Hold,
     /// Check the vehicle on its pad; with `moves`, gimbal and fins move.
-    Check {
-        moves: bool,
-    },
+    Check { moves: bool },
     /// Confirm that every surface moved as it should.
     Seen,
     /// Sign a step of the checklist, counted from zero, or take its signature back.
-    Sign {
-        step: usize,
-        void: bool,
-    },
+    Sign { step: usize, void: bool },
     /// Quit, although the vehicle is armed or in flight.
     Quit,
 }

@@ -4,10 +4,8 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 
-use super::{
-    Model, every_second, is_flight,
-    quantity::{ALL, COUNT, Quantity},
-};
+use super::quantity::{ALL, COUNT, Quantity};
+use super::{Model, every_second, is_flight, is_on_pad};
 
 /// The longest timeline, so that a vehicle that keeps changing its phase cannot fill the memory.
 pub(crate) const TIMELINE_MAX: usize = 64;
@@ -30,6 +28,10 @@ const ROWS_MAX: usize = 1_200;
 /// How often a row is added in flight, and otherwise.
 const FLIGHT_STEP: Duration = Duration::from_millis(200);
 const CALM_STEP: Duration = Duration::from_secs(1);
+
+/// A trend compares the ends of this time, each averaged over this part.
+const TREND_OVER: Duration = Duration::from_mins(1);
+const TREND_PART: Duration = Duration::from_secs(10);
 
 /// The values of one moment, in the order of [`ALL`]; NaN where a value was unknown or stale.
 type Row = [f32; COUNT];
@@ -58,6 +60,18 @@ impl Trace {
         inside.map(move |(at, row)| (*at, f64::from(row[place]))).filter(|(_, value)| value.is_finite())
     }
 
+    /// How much a quantity has risen within the last minute: the mean of the newest part less that
+    /// of the oldest; `None` without both.
+    pub fn rise(&self, quantity: &Quantity, now: Duration) -> Option<f64> {
+        let mean = |from: Duration, to: Duration| {
+            let count = self.values(quantity, from, to).count();
+            let sum: f64 = self.values(quantity, from, to).map(|(_, value)| value).sum();
+            (count > 0).then(|| sum / count as f64)
+        };
+        let begin = now.checked_sub(TREND_OVER)?;
+        Some(mean(now.saturating_sub(TREND_PART), now)? - mean(begin, begin + TREND_PART)?)
+    }
+
     fn push(&mut self, at: Duration, row: Row) {
         if self.rows.len() >= ROWS_MAX {
             every_second(&mut self.rows);
@@ -80,6 +94,11 @@ pub(crate) fn note_trace(model: &mut Model, now: Duration) {
         value.map_or(f32::NAN, |sample| sample.value as f32)
     });
     model.history.trace.push(now, row);
+}
+
+/// When the flight began.
+pub fn flight_began(model: &Model) -> Option<Duration> {
+    model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
 }
 
 #[cfg(test)]

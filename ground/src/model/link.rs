@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::{Model, Role, time_boot_ms};
 
 /// How long a radio's last report about itself is shown.
-pub const RADIO_FRESH: Duration = Duration::from_secs(5);
+const RADIO_FRESH: Duration = Duration::from_secs(5);
 
 /// How long arming and starting are refused after a frame of another station under our address.
 const SAME_ID_FOR: Duration = Duration::from_secs(10);
@@ -55,7 +55,7 @@ pub struct Link {
     /// The hints for a link without data were reported.
     pub(crate) hints_reported: bool,
     /// The last report of a radio about itself, and its time. It is no evidence of the vehicle.
-    pub radio: Option<(RADIO_STATUS_DATA, Duration)>,
+    pub(crate) radio: Option<(RADIO_STATUS_DATA, Duration)>,
     /// The number of the link that brought the last frame, if there are several.
     pub(crate) received_over: Option<usize>,
     /// From where the last frame came: a number for each link and address.
@@ -156,6 +156,12 @@ impl Link {
         let content = self.content.age(now).map(|age| now.saturating_sub(age));
         let last = self.first_heartbeat_at.and(self.last_frame_at);
         LinkState::of(last.map(|at| content.unwrap_or(at).min(at)), now)
+    }
+
+    /// The last report of a radio about itself, while it is fresh.
+    pub fn radio(&self, now: Duration) -> Option<&RADIO_STATUS_DATA> {
+        let fresh = self.radio.as_ref().filter(|(_, at)| now.saturating_sub(*at) < RADIO_FRESH);
+        fresh.map(|(radio, _)| radio)
     }
 
     /// The share of recent frames that was lost; `None` while nothing arrives that would show it.
@@ -293,7 +299,7 @@ impl Uplink {
     }
 
     /// Why the vehicle does not receive this station, as far as it reports.
-    pub fn why_not_received(&self) -> String {
+    pub fn why_unproven(&self) -> String {
         let Some(refused) = self.refused else { return "it reports no frame".to_owned() };
         let Address { system_id, component_id } = refused.source;
         format!("it refuses frames of {system_id}/{component_id}: {}", refusal(refused.why))

@@ -31,7 +31,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use protocol::command::CommandSender;
-use protocol::dialect::{MavMessage, TdPhase, TdRole};
+use protocol::dialect::{MavMessage, TIMESYNC_DATA, TdPhase, TdRole};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{self, EventLevel, Record};
 use protocol::log::v1::OperatorAction;
@@ -164,6 +164,12 @@ pub struct Playback {
     /// Each phase of the recording and when it began.
     pub phases: Arc<[(TdPhase, Duration)]>,
 }
+
+/// Number of requests that may wait for an answer: of 10 s, one a second and those of a range test.
+const TIMESYNC_STAMPS_MAX: usize = 64;
+
+/// The longest note, in characters: a line of the smallest terminal with its name.
+pub(crate) const NOTE_MAX: usize = 60;
 
 /// When each periodic action is next due.
 #[derive(Debug, Clone, Copy, Default)]
@@ -318,14 +324,7 @@ impl Model {
     }
 
     /// Records an action of the crew, and adds it to the list of events.
-    pub(crate) fn report_action(
-        &mut self,
-        now: Duration,
-        kind: &str,
-        by: &Seat,
-        level: EventLevel,
-        text: String,
-    ) {
+    pub(crate) fn log_act(&mut self, now: Duration, kind: &str, by: &Seat, level: EventLevel, text: String) {
         self.record_operator(now, kind, by, &text);
         self.list_event(now, Speaker::Ground, level, text);
     }
@@ -338,15 +337,28 @@ impl Model {
 
     /// Enters a line into the book.
     pub(crate) fn enter(&mut self, kind: &str, who: &str, text: &str) {
-        self.outbox.push(Action::Enter(BookLine {
-            kind: kind.to_owned(),
-            who: who.to_owned(),
-            text: text.to_owned(),
-        }));
+        let [kind, who, text] = [kind, who, text].map(str::to_owned);
+        self.outbox.push(Action::Enter(BookLine { kind, who, text }));
+    }
+
+    /// Requests the vehicle's time; the answer repeats this stamp, ns.
+    pub(crate) fn request_time(&mut self, stamp: i64) {
+        self.link.timesync_stamps.truncate(TIMESYNC_STAMPS_MAX - 1);
+        self.link.timesync_stamps.push_front(stamp);
+        self.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
+            tc1: 0,
+            ts1: stamp,
+            target_system: self.settings.vehicle.system_id,
+            target_component: self.settings.vehicle.component_id,
+        })));
     }
 
     pub(crate) fn info(&mut self, now: Duration, text: impl Into<String>) {
         self.add_event(now, Speaker::Ground, EventLevel::Info, text);
+    }
+
+    pub(crate) fn error(&mut self, now: Duration, text: impl Into<String>) {
+        self.add_event(now, Speaker::Ground, EventLevel::Error, text);
     }
 
     pub(crate) fn warn(&mut self, now: Duration, text: impl Into<String>) {

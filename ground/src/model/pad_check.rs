@@ -192,6 +192,15 @@ pub const MARGIN_LEAST_DB: f64 = 10.0;
 /// Steps of a SiK radio's RSSI in 1 dB: its manual gives RSSI = 1.9 (dBm + 127).
 const STEPS_PER_DB: f64 = 1.9;
 
+/// Signal strength at 0 steps, dBm, by the same manual.
+const RSSI_ZERO_DBM: f64 = -127.0;
+
+/// Received signal strength, dBm, at the weaker end; `None` if the radio does not report it.
+pub fn rssi_dbm(radio: &RADIO_STATUS_DATA) -> Option<f64> {
+    let steps = [radio.rssi, radio.remrssi].into_iter().filter(|steps| *steps != u8::MAX).min()?;
+    Some(RSSI_ZERO_DBM + f64::from(steps) / STEPS_PER_DB)
+}
+
 /// Signal over noise, dB, at the worse end; `None` if the radio does not report it.
 pub fn margin_db(radio: &RADIO_STATUS_DATA) -> Option<f64> {
     let known = |signal: u8, noise: u8| {

@@ -7,10 +7,8 @@ use protocol::dialect::ESTIMATOR_STATUS_DATA;
 pub use protocol::motion::Degrees;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    Model, Sample,
-    dead_reckoning::{POSITION_ERROR_M, predict_position},
-};
+use super::dead_reckoning::{POSITION_ERROR_M, predict_position};
+use super::{Model, Sample};
 
 /// Radius around a position that holds it in 19 of 20 cases, in standard deviations of each axis:
 /// sqrt(-2 ln 0.05).
@@ -118,8 +116,7 @@ impl Model {
     pub fn intended_touchdown(&self) -> Option<Spot> {
         let fence_m = self.vehicle.fence_m()?;
         let predicted = self.vehicle.descent().map(|descent| descent.value);
-        let finite =
-            |value: Option<f32>| value.map(f64::from).filter(|value| value.is_finite()).unwrap_or(0.0);
+        let finite = |m: Option<f32>| m.map(f64::from).filter(|m| m.is_finite()).unwrap_or(0.0);
         Some(Spot {
             north_m: finite(predicted.as_ref().map(|descent| descent.touchdown_x_m)),
             east_m: finite(predicted.map(|descent| descent.touchdown_y_m)),

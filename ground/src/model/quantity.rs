@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::dialect::TD_CONTROLLER_DATA;
 use protocol::link_stats::LinkFigures;
 
-use super::{BodySpeed, Deflection, Gimbal, Model, Motion, Sample, Vehicle};
+use super::{BodySpeed, Deflection, Gimbal, Model, Motion, Sample, Vehicle, margin_db, rssi_dbm};
 
 type Read = fn(&Model, Duration) -> Option<Sample<f64>>;
 
@@ -49,7 +49,7 @@ impl Quantity {
 }
 
 /// How many quantities there are.
-pub const COUNT: usize = 40;
+pub const COUNT: usize = 42;
 
 const fn quantity(name: &'static str, unit: &'static str, decimals: usize, read: Read) -> Quantity {
     Quantity { name, unit, decimals, read }
@@ -108,6 +108,8 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("round trip", "ms", 0, |m, now| {
         m.link.round_trip.map(|trip| Sample::new(1_000.0 * trip.as_secs_f64(), now))
     }),
+    quantity("rssi", "dBm", 0, |m, now| Some(Sample::new(rssi_dbm(m.link.radio(now)?)?, now))),
+    quantity("radio margin", "dB", 1, |m, now| Some(Sample::new(margin_db(m.link.radio(now)?)?, now))),
     quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
 

@@ -9,11 +9,8 @@ use protocol::dialect::{
 use protocol::log::record::EventLevel;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    CommandKind, Event, Model, Role, Sample, Seat, Speaker, Vehicle, Verdict,
-    dead_reckoning::{is_silent, may_have_left, predict_position},
-    is_on_pad, role_name,
-};
+use super::dead_reckoning::{is_silent, may_have_left, predict_position};
+use super::{CommandKind, Event, Model, Role, Sample, Seat, Speaker, Vehicle, Verdict, is_on_pad, role_name};
 
 /// Why people must stay away, the worst reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -127,8 +124,7 @@ impl Vehicle {
 
     /// Ends the warning from before once the pin was reported, or the crew has armed since.
     pub(crate) fn end_before(&mut self, now: Duration) {
-        let pinned =
-            self.status.as_ref().is_some_and(|reported| reported.value.motor == TdMotor::TD_MOTOR_PIN_IN);
+        let pinned = self.reports(|status| status.motor == TdMotor::TD_MOTOR_PIN_IN);
         if (pinned || self.is_armed()) && self.wait_before(now).is_none() {
             self.before = None;
         } else if pinned && let Some(before) = &mut self.before {
@@ -152,10 +148,9 @@ impl Model {
     pub fn unfinished(&self, now: Duration) -> Unfinished {
         let abort = match self.commands.of(CommandKind::Abort) {
             Some(track) if track.is_confirmed() => None,
-            Some(track) => Some(abort_request_words(
-                self.settings.start_unix_s + track.commanded_at.as_secs(),
-                &track.by,
-            )),
+            Some(track) => {
+                Some(abort_stamp(self.settings.start_unix_s + track.commanded_at.as_secs(), &track.by))
+            }
             None => self.abort_before.clone(),
         };
         Unfinished { abort, danger: KeepAway::of(&self.vehicle, now).map(|away| away.danger) }
@@ -166,7 +161,7 @@ impl Model {
         self.stored_unfinished = Some(unfinished.clone());
         if let Some(at) = &unfinished.abort {
             let text = format!("an ABORT was requested at {at} and not confirmed");
-            self.add_event(now, Speaker::Ground, EventLevel::Error, text);
+            self.error(now, text);
         }
         self.abort_before = unfinished.abort;
         self.vehicle.before = unfinished.danger.map(|danger| {
@@ -177,7 +172,7 @@ impl Model {
 }
 
 /// Time, operator and screen of an abort.
-pub fn abort_request_words(unix_s: u64, by: &Seat) -> String {
+pub fn abort_stamp(unix_s: u64, by: &Seat) -> String {
     let [hour, minute, second] = [unix_s / 3_600 % 24, unix_s / 60 % 60, unix_s % 60];
     format!("{hour:02}:{minute:02}:{second:02} UTC{}", by.in_brackets())
 }
@@ -424,7 +419,7 @@ impl Ending {
 }
 
 /// Whether its parachute was open at its last report.
-fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
+pub(super) fn hangs_on_its_chute(vehicle: &Vehicle) -> bool {
     vehicle.descent().is_some_and(|descent| descent.value.chute == TdChute::TD_CHUTE_OPEN)
 }
 
@@ -507,9 +502,8 @@ pub fn latch_cause(vehicle: &Vehicle) -> Option<&'static str> {
 
 /// Whether it climbs without a command: people near the pad have seconds.
 pub fn is_liftoff_by_itself(vehicle: &Vehicle) -> bool {
-    let latch = vehicle.status.as_ref().map(|status| status.value.latch);
     let climbs = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
-    climbs && latch == Some(TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF)
+    climbs && vehicle.reports(|status| status.latch == TdLatch::TD_LATCH_UNCOMMANDED_LIFTOFF)
 }
 
 /// The latch in words, with its cause; `None` while nothing is latched, and for a motor that did
@@ -518,8 +512,7 @@ pub fn latch_words(model: &Model) -> Option<String> {
     let vehicle = &model.vehicle;
     let aborted = vehicle.interlocks()?.contains(TdInterlock::TD_INTERLOCK_ABORT_LATCHED);
     let cause = latch_cause(vehicle);
-    let no_light =
-        vehicle.status.as_ref().is_some_and(|status| status.value.latch == TdLatch::TD_LATCH_NO_LIGHT);
+    let no_light = vehicle.reports(|status| status.latch == TdLatch::TD_LATCH_NO_LIGHT);
     let word = match (aborted, cause) {
         (true, _) => "ABORT LATCHED",
         (false, Some(_)) if !no_light => "MOTOR INHIBITED",

@@ -26,9 +26,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     vehicle.reported.update(message);
     vehicle.store(message, now);
     match message {
-        MavMessage::HEARTBEAT(data) => {
-            vehicle.heartbeat = Some(Sample::new(heartbeat(data), now));
-        }
+        MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),
         MavMessage::TD_FLIGHT_STATUS(_) => {
             vehicle.status = vehicle.reported.status().map(|status| Sample::new(status.clone(), now));
             vehicle.note_checks();
@@ -83,8 +81,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
         }
         Some(_) => {
             let since = *vehicle.left_pad_at.get_or_insert(now);
-            let climbs =
-                |motion: Sample<Motion>| motion.received_at >= since && motion.value.climb_m_s > MOVES_M_S;
+            let climbs = |of: Sample<Motion>| of.received_at >= since && of.value.climb_m_s > MOVES_M_S;
             let is_boosting = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
             vehicle.has_lifted |= !is_boosting || vehicle.best_motion().is_some_and(climbs);
         }
@@ -156,12 +153,8 @@ impl Vehicle {
             TdStart::TD_START_APOGEE => Some("apogee"),
             TdStart::TD_START_DRONE => Some("drone"),
         };
-        Some(FlownMission {
-            hash: MissionHash(data.hash),
-            name: name(&data.name[..]),
-            start,
-            motor_burns: data.motor_burns,
-        })
+        let (hash, name, motor_burns) = (MissionHash(data.hash), name(&data.name[..]), data.motor_burns);
+        Some(FlownMission { hash, name, start, motor_burns })
     }
 
     fn converted<M: MessageData, T>(&self, convert: impl FnOnce(&M) -> T) -> Option<Sample<T>> {

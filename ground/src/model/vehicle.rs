@@ -174,8 +174,7 @@ impl Findings {
 
     /// Those that have arrived, first in time: T+ in seconds and a short sentence.
     pub fn in_time(&self) -> Vec<(f64, &str)> {
-        let mut all: Vec<_> =
-            self.arrived.values().map(|(since_s, words)| (*since_s, words.as_str())).collect();
+        let mut all: Vec<_> = self.arrived.values().map(|(at_s, words)| (*at_s, words.as_str())).collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all
     }
@@ -239,9 +238,14 @@ impl Vehicle {
         self.status.as_ref().map(|status| status.value.interlocks)
     }
 
+    /// Whether its last status says this; false before the first.
+    pub fn reports(&self, says: impl FnOnce(&TD_FLIGHT_STATUS_DATA) -> bool) -> bool {
+        self.status.as_ref().is_some_and(|status| says(&status.value))
+    }
+
     /// Whether it reports this interlock.
     pub fn shows(&self, interlock: TdInterlock) -> bool {
-        self.interlocks().is_some_and(|locks| locks.contains(interlock))
+        self.reports(|status| status.interlocks.contains(interlock))
     }
 
     /// Whether the landing motor can still ignite: no latch forbids it. Unknown counts as no.

@@ -7,13 +7,11 @@ use protocol::dialect::{
     TdControlLevel, TdInterlock, TdPhase,
 };
 use protocol::identity::Address;
-use protocol::log::record::EventLevel;
 
-use super::Action;
 use crate::model::{
-    Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
-    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, Speaker, dead_reckoning::may_have_left,
-    foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
+    Acknowledgement, Action, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
+    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, dead_reckoning::may_have_left, foreign_name,
+    hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -100,7 +98,7 @@ const OF_STATION: [AlarmRow; 15] = [
         is_lost.then(|| "LINK LOST: no telemetry".to_owned())
     }),
     of_run(AlarmKind::UplinkLost, VEHICLE, |model, now| {
-        let why = || model.link.uplink.why_not_received();
+        let why = || model.link.uplink.why_unproven();
         let is_lost = is_uplink_lost(model, model.link.valid_until(now));
         is_lost.then(|| format!("UPLINK LOST: the vehicle does not receive this station; {}", why()))
     }),
@@ -161,8 +159,8 @@ const OF_VEHICLE: [AlarmRow; 14] = [
     }),
     of_boot(AlarmKind::Degraded, OTHER, |model, now| {
         let upright = controller(model, now)?.level == TdControlLevel::TD_CONTROL_LEVEL_STABILISER;
-        let ignited_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
-        let is_late = now.saturating_sub(ignited_at) >= FIRST_PLAN_WITHIN;
+        let burn_at = model.history.timeline.last().map_or(Duration::ZERO, |(_, at)| *at);
+        let is_late = now.saturating_sub(burn_at) >= FIRST_PLAN_WITHIN;
         (upright && is_late).then(|| "DEGRADED: the stabiliser flies".to_owned())
     }),
     of_boot(AlarmKind::PlanOutside, OTHER, |model, _| {
@@ -187,7 +185,7 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
     for alarm in raised {
         // Also an event for runs without a screen; other alarms have an event of their own.
         if alarm.what.urgency == WHO || alarm.what.kind == AlarmKind::UplinkLost {
-            model.add_event(now, Speaker::Ground, EventLevel::Error, alarm.what.text.clone());
+            model.error(now, alarm.what.text.clone());
         }
         model.outbox.push(Action::Alarm(alarm.what.text));
     }
@@ -197,8 +195,8 @@ pub(super) fn watch(model: &mut Model, now: Duration) {
 /// their keys.
 fn other_station(model: &Model) -> Option<String> {
     let Address { system_id, component_id } = model.link.uplink.unproven(model.link.signing.is_some())?;
-    let is_unnamed = model.vehicle.is_armed() && model.people().is_none();
-    is_unnamed.then(|| sender_words(model, &format!("{system_id}/{component_id}")))
+    let is_anonymous = model.vehicle.is_armed() && model.people().is_none();
+    is_anonymous.then(|| sender_words(model, &format!("{system_id}/{component_id}")))
 }
 
 /// Whether telemetry arrives and shows that the vehicle does not receive this station.
@@ -306,7 +304,7 @@ fn vehicle_log(model: &Model) -> Option<String> {
 
 /// Whether the vehicle reports that it fails this check; it reports so on its pad only.
 fn fails(model: &Model, check: TdCheck) -> bool {
-    model.vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.contains(check))
+    model.vehicle.reports(|status| status.checks_failed.contains(check))
 }
 
 // Callouts: a line of text to the crew's voice command, or bells without one.
@@ -412,9 +410,8 @@ fn call_phase(model: &mut Model) {
 /// Calls out the last step of the height that was passed.
 fn call_height(model: &mut Model, now: Duration) {
     let fresh = model.vehicle.height_m().filter(|height| !height.is_stale(now) && height.value.is_finite());
-    let Some(height_m) = fresh.filter(|_| model.vehicle.in_flight()).map(|height| height.value) else {
-        return;
-    };
+    let Some(height) = fresh.filter(|_| model.vehicle.in_flight()) else { return };
+    let height_m = height.value;
     let Some(before_m) = model.called.height_m.replace(height_m) else { return };
     let low = height_m.min(before_m) < LOW_BELOW_M;
     let (step_m, amount) = if low { (LOW_STEP_M, Amount::All) } else { (HIGH_STEP_M, Amount::Normal) };

@@ -8,9 +8,8 @@ use protocol::dialect::{COMMAND_LONG_DATA, MavMessage, MavResult, TdAct, TdHold,
 use protocol::log::record::EventLevel;
 use protocol::mission::MissionHash;
 
-use super::Action;
 use crate::model::{
-    Acknowledgement, AutoStep, CommandKind, CommandRow, Commands, LogFault, LogStanding, Model, Seat,
+    Acknowledgement, Action, AutoStep, CommandKind, CommandRow, Commands, LogFault, LogStanding, Model, Seat,
     Speaker, TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen,
     why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
@@ -28,9 +27,9 @@ pub(super) fn without_log(model: &mut Model, by: &Seat, now: Duration) {
         return model.warn(now, format!("not without a log: {why}"));
     }
     model.without_log = Some(fault);
-    let text =
-        format!("WITHOUT A LOG: arm and start go on although the station log {words}{}", by.in_brackets());
-    model.report_action(now, "without log", by, EventLevel::Warning, text);
+    let what = "arm and start go on although the station log";
+    let text = format!("WITHOUT A LOG: {what} {words}{}", by.in_brackets());
+    model.log_act(now, "without log", by, EventLevel::Warning, text);
 }
 
 /// The crew arms a motor that no burn of its lot has confirmed. The operator is recorded as for
@@ -44,7 +43,7 @@ pub(super) fn untested(model: &mut Model, by: &Seat, now: Duration) {
     }
     model.untested = model.vehicle.boot.number();
     let text = format!("UNTESTED MOTOR: arming goes on although {why}{}", by.in_brackets());
-    model.report_action(now, "untested motor", by, EventLevel::Warning, text);
+    model.log_act(now, "untested motor", by, EventLevel::Warning, text);
 }
 
 /// Sends a command, unless the vehicle has changed in the meantime or the same command is already
@@ -58,10 +57,8 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         CommandKind::ConfirmArm | CommandKind::ConfirmStart => {
             let none = || "no operator of another role requests it".to_owned();
             let start = kind == CommandKind::ConfirmStart;
-            let proposal = model
-                .proposal_to_confirm(now)
-                .filter(|proposal| (proposal.act == TdAct::TD_ACT_START) == start);
-            proposal.map_or_else(|| Some(none()), |proposal| why_not_confirm(model, &proposal, now))
+            let open = model.open_proposal(now).filter(|open| (open.act == TdAct::TD_ACT_START) == start);
+            open.map_or_else(|| Some(none()), |open| why_not_confirm(model, &open, now))
         }
         CommandKind::TakeCommand => why_not_take(model, now),
         CommandKind::Tap => {
@@ -86,7 +83,7 @@ pub(super) fn command(model: &mut Model, kind: CommandKind, by: &Seat, now: Dura
         None => submit(model, kind, by.clone(), now),
         Some(why) => {
             let text = format!("cannot {}: {why}{}", kind.row().name.to_lowercase(), by.in_brackets());
-            model.report_action(now, "not sent", by, EventLevel::Warning, text);
+            model.log_act(now, "not sent", by, EventLevel::Warning, text);
         }
     }
 }
@@ -146,10 +143,7 @@ fn send(model: &mut Model, kind: CommandKind, now: Duration) -> Ticket {
     let CommandRow { mav: (command, param1), moves, resend, .. } = kind.row();
     // A confirmation names its proposal; without a number it would be a new proposal.
     let confirms = matches!(kind, CommandKind::ConfirmArm | CommandKind::ConfirmStart);
-    let number = model
-        .proposal_to_confirm(now)
-        .filter(|_| confirms)
-        .map_or(0.0, |proposal| f32::from(proposal.number));
+    let number = model.open_proposal(now).filter(|_| confirms).map_or(0.0, |open| f32::from(open.number));
     // An arm names its mission: the vehicle refuses it if it flies another one.
     let arms = matches!(kind, CommandKind::Arm | CommandKind::ConfirmArm);
     let mission = model.settings.mission.filter(|_| arms).map_or([0.0; 3], MissionHash::to_params);
@@ -171,7 +165,7 @@ pub(super) fn poll(model: &mut Model, now: Duration) {
 pub(super) fn on_answer(model: &mut Model, answer: CommandAnswer, now: Duration) {
     let awaited = model.commands.sender.on_answer(&answer, now);
     let given_up =
-        track_of(model, answer.command).is_some_and(|track| track.acknowledged == Acknowledgement::GivenUp);
+        track_of(model, answer.command).map(|of| of.acknowledged) == Some(Acknowledgement::GivenUp);
     if !awaited && given_up {
         // The answer to a command that was given up is still recorded.
         let CommandAnswer { command, result, .. } = answer;
@@ -222,22 +216,16 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             ("acknowledged", EventLevel::Info, format!("{name} acknowledged: in progress"))
         }
         CommandEvent::Answered { result, open, .. } | CommandEvent::AnsweredLate { result, open, .. } => {
-            let awaits_confirmation = open && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
-            track.acknowledged = if awaits_confirmation {
-                Acknowledgement::AwaitsConfirmation
-            } else {
-                Acknowledgement::Answered(result)
-            };
+            let is_proposed = open && result == MavResult::MAV_RESULT_TEMPORARILY_REJECTED as u8;
+            track.acknowledged =
+                if is_proposed { Acknowledgement::Proposed } else { Acknowledgement::Answered(result) };
             track.acknowledged_at = Some(now);
             answered = (!open).then_some(result);
             let words = result_words(result);
             let late = if matches!(event, CommandEvent::AnsweredLate { .. }) { " (late)" } else { "" };
-            if awaits_confirmation {
-                (
-                    "requested",
-                    EventLevel::Info,
-                    format!("{name} requested{late}: another role must confirm{over}"),
-                )
+            if is_proposed {
+                let text = format!("{name} requested{late}: another role must confirm{over}");
+                ("requested", EventLevel::Info, text)
             } else if track.accepted() {
                 ("acknowledged", EventLevel::Info, format!("{name} acknowledged{late}: {words}{over}"))
             } else {
@@ -249,9 +237,8 @@ fn on_event(model: &mut Model, event: CommandEvent, now: Duration) {
             ("unanswered", EventLevel::Error, format!("{name} not acknowledged after {attempts} attempts"))
         }
     };
-    let detail =
-        if matches!(event, CommandEvent::Sent { .. }) { text.clone() } else { format!("{text}{by}") };
-    model.record_operator(now, operator_kind, &seat, &detail);
+    let by = if matches!(event, CommandEvent::Sent { .. }) { "" } else { by.as_str() };
+    model.record_operator(now, operator_kind, &seat, &format!("{text}{by}"));
     model.list_event(now, Speaker::Ground, level, text);
     if let Some(result) = answered {
         on_final_answer(model, kind, result, now);
@@ -352,7 +339,7 @@ pub(super) fn observe(model: &mut Model, now: Duration) {
         changes.push((level, track.by.clone(), text));
     }
     for (level, by, text) in changes {
-        model.report_action(now, "observed", &by, level, text);
+        model.log_act(now, "observed", &by, level, text);
     }
     // A refusal counts only when it arrives: it may be another vehicle's.
     if model.commands.of(CommandKind::Abort).is_some_and(|track| track.observed_at.is_some()) {
@@ -374,7 +361,7 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
     let is_live = model.vehicle.boot.is_identified() && !model.vehicle.boot.is_simulated();
     if model.auto_step != AutoStep::Done && is_live {
         let why = "the vehicle is live: it does not report that it is simulated";
-        model.add_event(now, Speaker::Ground, EventLevel::Error, format!("automatic mode refused: {why}"));
+        model.error(now, format!("automatic mode refused: {why}"));
         model.auto_step = AutoStep::Done;
         model.outcome.refusal = Some((format!("the automatic mode: {why}"), now));
         return;
@@ -499,7 +486,7 @@ pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
         model.crew.too_late_reported = too_late;
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
         let text = format!("{} in the countdown: {what}", why.words());
-        model.report_action(now, "hold", &Seat::default(), EventLevel::Warning, text);
+        model.log_act(now, "hold", &Seat::default(), EventLevel::Warning, text);
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if too_late {

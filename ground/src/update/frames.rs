@@ -10,8 +10,10 @@ use protocol::log::record::EventLevel;
 use protocol::reported::boot_of;
 use protocol::text::Text;
 
-use super::{Action, commands, pad, vehicle_changes};
-use crate::model::{Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms};
+use super::{commands, pad, vehicle_changes};
+use crate::model::{
+    Action, Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms,
+};
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;

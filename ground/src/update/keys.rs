@@ -11,13 +11,15 @@ use std::time::Duration;
 
 use protocol::dialect::{TdAct, TdInterlock};
 
-use super::{Action, Request, on_request, pad};
+use super::pad;
+use super::requests::{acknowledge, on_request};
 use crate::key::Key;
 use crate::model::{
-    AGAIN_AFTER, AGAIN_KEY, Act, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model, Page,
-    PaletteAction, Prompt, RestOfWord, Role, Standing, TextEntry, hold_words, overruled_by, palette_entries,
-    quantity, standing, why_not_arm, why_not_check, why_not_confirm, why_not_here, why_not_quit,
-    why_not_seen, why_not_start, why_not_take, why_nothing_flown, why_nothing_moves,
+    AGAIN_AFTER, AGAIN_KEY, Act, Action, AlarmKind, CommandKind, Dialog, FINGERS_APART, KeyOrigin, Model,
+    NOTE_MAX, Page, PaletteAction, Prompt, Request, RestOfWord, Role, Standing, TextEntry, hold_words,
+    overruled_by, palette_entries, quantity, standing, why_not_arm, why_not_check, why_not_confirm,
+    why_not_here, why_not_quit, why_not_seen, why_not_start, why_not_take, why_nothing_flown,
+    why_nothing_moves,
 };
 
 /// How many lines PgUp and PgDn scroll.
@@ -160,9 +162,7 @@ fn on_abort_key(model: &mut Model, key: Key, now: Duration) -> bool {
 fn on_dialog_key(model: &mut Model, mut dialog: Dialog, key: Key, touch: KeyOrigin, now: Duration) {
     let by_hand = touch == KeyOrigin::Typed;
     match key {
-        AGAIN_KEY if dialog.again_from.is_some() => {
-            on_again(model, dialog, by_hand, now);
-        }
+        AGAIN_KEY if dialog.again_from.is_some() => on_again(model, dialog, by_hand, now),
         Key::Enter if dialog.is_complete() && touch != KeyOrigin::Repeat => {
             model.key_timing.hurried |= !by_hand;
             if model.key_timing.hurried && dialog.prompt.needs_a_hand() {
@@ -336,9 +336,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::Seen => open_unless(model, Prompt::Seen, "say so", why_not_seen(model, now), now),
         Act::Check | Act::CheckStill => match standing(model, now) {
-            Standing::Runs | Standing::MayRun => {
-                request(model, Request::Command(CommandKind::EndCheck), now);
-            }
+            Standing::Runs | Standing::MayRun => request(model, Request::Command(CommandKind::EndCheck), now),
             Standing::JustEnded => {
                 model.info(now, "the check has just ended; press again in 3 s for another one");
             }
@@ -375,9 +373,8 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
             model.outbox.push(Action::MovePin(!is_out));
         }
         Act::MovePin => {
-            let why =
-                "only a demonstration's pin is moved here, on the ground; `onboard-sim fly` takes `pin in`";
-            model.info(now, why);
+            let why = "only a demonstration's pin is moved here, on the ground";
+            model.info(now, format!("{why}; `onboard-sim fly` takes `pin in`"));
         }
         Act::SignStep => pad::open_sign_dialog(model, false, now),
         Act::VoidStep => pad::open_sign_dialog(model, true, now),
@@ -386,13 +383,9 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         Act::Hold if model.pages.held.is_some() => model.pages.hold(None),
         Act::Hold => model.pages.hold(Some(shown)),
         Act::Follow => model.pages.hold(None),
-        Act::Note if act.works(model, now) => {
-            model.pages.entry = Some(TextEntry::default());
-        }
+        Act::Note if act.works(model, now) => model.pages.entry = Some(TextEntry::default()),
         Act::Note => model.info(now, "this screen only looks on; it records no notes"),
-        Act::Palette => {
-            model.pages.entry = Some(TextEntry { chosen: Some(0), ..TextEntry::default() });
-        }
+        Act::Palette => model.pages.entry = Some(TextEntry { chosen: Some(0), ..TextEntry::default() }),
         Act::NextTheme => model.outbox.push(Action::NextTheme),
         Act::Redraw => model.outbox.push(Action::Redraw),
         Act::Quit => quit(model, now),
@@ -431,9 +424,7 @@ fn open(model: &mut Model, prompt: Prompt, now: Duration) {
 /// the same key at the same moment, the vehicle accepts the first proposal and reports it to the
 /// other.
 fn confirms(model: &mut Model, act: TdAct, now: Duration) -> bool {
-    let Some(proposal) = model.proposal_to_confirm(now).filter(|proposal| proposal.act == act) else {
-        return false;
-    };
+    let Some(proposal) = model.open_proposal(now).filter(|open| open.act == act) else { return false };
     open_unless(model, Prompt::Confirm(proposal), "confirm", why_not_confirm(model, &proposal, now), now);
     true
 }
@@ -478,15 +469,6 @@ fn see_alarm(model: &mut Model, now: Duration) {
     }
 }
 
-pub(super) fn acknowledge(model: &mut Model, kind: AlarmKind, now: Duration) {
-    if kind == AlarmKind::AbortBefore {
-        model.abort_before = None;
-    }
-    if let Some(text) = model.alarms.acknowledge(kind) {
-        model.info(now, format!("alarm acknowledged: {text}"));
-    }
-}
-
 /// Chooses the next or the previous alarm of the list.
 fn choose_alarm(model: &mut Model, up: bool) {
     let list = model.alarms.list();
@@ -515,15 +497,12 @@ fn quit(model: &mut Model, now: Duration) {
 
 // The keys while a part of an action's words is typed in the palette.
 
-/// The longest text.
-const TYPED_MAX: usize = crate::attach::NOTE_MAX;
-
 /// A key while a text is typed. Esc gives up; the keys of the abort never come here.
 fn on_entry_key(model: &mut Model, key: Key, now: Duration) {
     let Some(TextEntry { mut typed, chosen }) = model.pages.entry.take() else { return };
     match key {
         Key::Backspace => drop(typed.pop()),
-        Key::Char(letter) if typed.chars().count() < TYPED_MAX => typed.push(letter),
+        Key::Char(letter) if typed.chars().count() < NOTE_MAX => typed.push(letter),
         _ => {}
     }
     let chosen = match (key, chosen) {

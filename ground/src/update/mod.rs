@@ -7,6 +7,7 @@ pub mod commands;
 pub mod frames;
 pub mod keys;
 pub mod pad;
+pub mod requests;
 pub mod tick;
 pub mod vehicle_changes;
 
@@ -14,7 +15,6 @@ use std::time::Duration;
 
 use protocol::book::SignedHead;
 use protocol::frame::{Frame, Framer, FramerCounters};
-use protocol::log::record::EventLevel;
 use protocol::signing::SigningCounters;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -22,7 +22,7 @@ use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
     BookState, Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat,
-    Speaker, Unfinished, why_nothing_flown,
+    Unfinished,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -33,19 +33,13 @@ pub type SignalName = &'static str;
 /// that only a replay or an attached screen uses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Msg {
+    /// A frame of the link.
     Frame(#[serde(with = "frame_bytes")] Frame),
-    /// The crew has completed every step of this request on a screen of the station.
-    Requested {
-        request: Request,
-        /// The operator and the screen.
-        by: Seat,
-    },
+    /// This operator has completed every step of this request on a screen of the station.
+    Requested { request: Request, by: Seat },
     /// The seats that can command have changed: those at screens that answer, and at those that do
     /// not.
-    Crew {
-        seats: Vec<Seat>,
-        silent: Vec<Seat>,
-    },
+    Crew { seats: Vec<Seat>, silent: Vec<Seat> },
     /// The crew has quit the station's own screen while the vehicle was armed or in flight; the
     /// station keeps running.
     ScreenQuit,
@@ -55,49 +49,34 @@ pub enum Msg {
     Report(Result<String, String>),
     /// The last position of the vehicle, stored before this run of the station.
     Place(Box<LastPlace>),
-    /// The station has signed the end of its book.
-    Book {
-        head: SignedHead,
-        /// False without a key: then the signature is empty.
-        is_signed: bool,
-    },
+    /// The end of the station's book, and whether the station has a key: without one the signature
+    /// is empty.
+    Book { head: SignedHead, is_signed: bool },
     /// The station has not signed or voided a step of the checklist; the reason.
     SignRefused(String),
     /// The terminal is lost; the station continues without it.
     ScreenLost,
     /// The next frame came over this link; sent only if there are several links.
-    ReceivedOver(usize),
+    OverLink(usize),
     /// The next frames come from this source: a number for each link and address.
-    ReceivedFrom(u16),
-    /// The state of each link, once a second and whenever one goes up or down.
-    Links {
-        /// In the order of their numbers.
-        links: Vec<LinkReport>,
-        /// How many frames passed or failed the signature check; `None` without a key.
-        signing: Option<SigningCounters>,
-    },
-    /// Bytes arrived, whether or not they form complete frames.
-    Received {
-        bytes: usize,
-        /// The framer's counters after these bytes.
-        framing: FramerCounters,
-    },
-    Sent {
-        bytes: usize,
-        /// How many writes have been dropped since the start.
-        drops: u64,
-    },
+    FromSource(u16),
+    /// The state of each link in the order of their numbers, once a second and whenever one goes up
+    /// or down; and how many frames passed or failed the signature check: `None` without a key.
+    Links { links: Vec<LinkReport>, signing: Option<SigningCounters> },
+    /// Bytes arrived, whether or not they form complete frames; the framer's counters after them.
+    Received { bytes: usize, framing: FramerCounters },
+    /// Bytes were sent; how many writes have been dropped since the start.
+    Sent { bytes: usize, drops: u64 },
     /// The link works; the peer.
     LinkUp(String),
     /// No link works; the reason.
     LinkDown(String),
     /// A warning about the links for the crew.
     LinkWarning(String),
+    /// The state of the log writer has changed.
     Log(LogHealth),
     /// The station's log continues in these files.
-    LogBegins {
-        log: String,
-    },
+    LogBegins { log: String },
     /// The embedded simulator has ended; the reason, if it failed.
     SimulatorEnded(Option<String>),
     /// Time passes; sent ten times a second.
@@ -151,7 +130,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
-        Msg::Requested { request, by } => on_request(model, request, by, now),
+        Msg::Requested { request, by } => requests::on_request(model, request, by, now),
         Msg::Crew { seats, silent } => {
             model.crew.set_seats(seats, silent, now);
             model.info(now, model.crew.words());
@@ -170,9 +149,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::ScreenTick => keys::pass(model, now),
         Msg::ScreenQuit => {
             let why = if model.is_at_risk() { "armed or in flight" } else { "people must keep away" };
-            let text =
-                format!("the screen was quit; {why}, so the station continues: `ground attach` shows it");
-            model.warn(now, text);
+            let then = "so the station continues: `ground attach` shows it";
+            model.warn(now, format!("the screen was quit; {why}, {then}"));
         }
         Msg::ScreenLost => {
             model.warn(now, "the terminal is gone: link and log continue; `ground attach` shows them");
@@ -196,8 +174,8 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.link.trouble = Some(why);
         }
         Msg::LinkWarning(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
-        Msg::ReceivedOver(number) => model.link.received_over = Some(number),
-        Msg::ReceivedFrom(source) => model.link.source = source,
+        Msg::OverLink(number) => model.link.received_over = Some(number),
+        Msg::FromSource(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),
         Msg::Log(health) => on_log_health(model, health, now),
         // The log before is complete. The flight is in it, and not in the one that is replayed and
@@ -209,12 +187,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         }
         Msg::SimulatorEnded(failure) => {
             if let Some(why) = failure {
-                model.add_event(
-                    now,
-                    Speaker::Ground,
-                    EventLevel::Error,
-                    format!("the simulator failed: {why}"),
-                );
+                model.error(now, format!("the simulator failed: {why}"));
                 model.outcome.error = Some(why);
             }
         }
@@ -239,37 +212,6 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
     alarms::watch(model, now);
     alarms::call_out(model, now);
     std::mem::take(&mut model.outbox)
-}
-
-fn on_request(model: &mut Model, request: Request, by: Seat, now: Duration) {
-    if request == Request::Command(CommandKind::Abort) {
-        model.link.abort_requested_at = None;
-    }
-    match request {
-        Request::Command(kind) => commands::command(model, kind, &by, now),
-        Request::Acknowledge(kind) => keys::acknowledge(model, kind, now),
-        Request::Report => {
-            if let Some(why) = why_nothing_flown(model) {
-                return model.info(now, format!("no report: {why}"));
-            }
-            model.info(now, "the report is being written");
-            model.outbox.push(Action::WriteReport);
-        }
-        Request::Choose(boot) => vehicle_changes::choose(model, boot, &by, now),
-        Request::RangeTest => pad::begin_range_test(model, by, now),
-        Request::WithoutLog => commands::without_log(model, &by, now),
-        Request::Untested => commands::untested(model, &by, now),
-        Request::Sign { step, void } => pad::sign(model, (step.into(), void), &by, now),
-        Request::Note(text) => {
-            model.report_action(
-                now,
-                "note",
-                &by,
-                EventLevel::Info,
-                format!("note{}: {text}", by.in_brackets()),
-            );
-        }
-    }
 }
 
 /// Records on an attached screen that its station runs.
@@ -298,16 +240,11 @@ fn on_reports(model: &mut Model, links: Vec<LinkReport>, signing: Option<Signing
 
 fn on_log_health(model: &mut Model, health: LogHealth, now: Duration) {
     if health.failed && !model.log.failed {
-        model.add_event(
-            now,
-            Speaker::Ground,
-            EventLevel::Error,
-            "the log has failed: nothing more is recorded",
-        );
+        model.error(now, "the log has failed: nothing more is recorded");
     }
     if health.removed && !model.log.removed {
         let text = "the log was removed: its records are written again under its name";
-        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+        model.error(now, text);
     }
     if health.dropped > 0 && model.log.dropped == 0 {
         model.warn(now, "the log cannot keep up: records are dropped");

@@ -6,21 +6,19 @@ use std::time::Duration;
 use protocol::dialect::{TD_PAD_CHECK_DATA, TdPadCheckState};
 use protocol::log::record::EventLevel;
 
-use super::{Action, tick};
 use crate::model::{
-    ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker, role_name,
-    shown, why_not_check, words,
+    Action, ChecklistEntry, Mark, Model, PadCheck, Prompt, RangeTest, Role, Seat, Signature, Speaker,
+    role_name, shown, why_not_check, words,
 };
 
 /// Opens the dialog that signs or voids the chosen step.
 pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
-    let Some(step) = model.chosen_step(now) else {
-        return model.info(now, "there is no checklist (--checklist)");
-    };
+    let none = "there is no checklist (--checklist)";
+    let Some(step) = model.chosen_step(now) else { return model.info(now, none) };
     model.pages.checklist = true;
     if model.settings.role == Role::Station
         && let seat = model.settings.seat.clone()
-        && let Err(why) = signature(model, (step, void), &seat, now)
+        && let Err(why) = signed(model, (step, void), &seat, now)
     {
         return refuse_signature(model, (step, void), &seat, &why, now);
     }
@@ -30,7 +28,7 @@ pub(super) fn open_sign_dialog(model: &mut Model, void: bool, now: Duration) {
 /// Signs or voids a step for a person at a screen of this station, unless the step or the person
 /// does not fit.
 pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, now: Duration) {
-    match signature(model, (step, void), by, now) {
+    match signed(model, (step, void), by, now) {
         Ok(signature) => {
             model.sign_refused = None;
             let mark = if void { Mark::Voided(signature.clone()) } else { Mark::Signed(signature.clone()) };
@@ -38,7 +36,7 @@ pub(super) fn sign(model: &mut Model, (step, void): (usize, bool), by: &Seat, no
             let verb = if void { "voided" } else { "signed" };
             let text = signature_words(model, step, &signature, verb, by);
             let level = if void { EventLevel::Warning } else { EventLevel::Info };
-            model.report_action(now, verb, by, level, text);
+            model.log_act(now, verb, by, level, text);
         }
         Err(why) => refuse_signature(model, (step, void), by, &why, now),
     }
@@ -72,13 +70,8 @@ fn signature_words(model: &Model, step: usize, signature: &Signature, verb: &str
 }
 
 /// The signature that would be stored.
-fn signature(
-    model: &Model,
-    (number, void): (usize, bool),
-    by: &Seat,
-    now: Duration,
-) -> Result<Signature, String> {
-    let step = model.checklist.as_ref().and_then(|list| list.steps.get(number));
+fn signed(model: &Model, (step, void): (usize, bool), by: &Seat, now: Duration) -> Result<Signature, String> {
+    let step = model.checklist.as_ref().and_then(|list| list.steps.get(step));
     let step = step.ok_or("there is no such step")?;
     let role = model.may_sign(&by.operator)?;
     let signature = Signature {
@@ -141,7 +134,7 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     }
     let counts = model.link.stats.counts(model.settings.vehicle);
     let text = format!("radio range test begins: 30 s, nothing is commanded{}", by.in_brackets());
-    model.report_action(now, "radio range test", &by, EventLevel::Info, text);
+    model.log_act(now, "radio range test", &by, EventLevel::Info, text);
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
@@ -156,11 +149,11 @@ pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
     let question = test.pass(counts, now);
     let ended = test.found.map(|found| (found, test.by.clone()));
     if let Some(ts1) = question {
-        tick::request_time(model, ts1);
+        model.request_time(ts1);
     }
     if let Some((found, by)) = ended {
         let level = if found.passed() { EventLevel::Info } else { EventLevel::Warning };
-        model.report_action(now, "radio range test", &by, level, found.words());
+        model.log_act(now, "radio range test", &by, level, found.words());
     }
 }
 

@@ -2,15 +2,13 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType, TIMESYNC_DATA,
-};
-use protocol::log::record::{EventLevel, Record};
+use protocol::dialect::{HEARTBEAT_DATA, MavAutopilot, MavMessage, MavModeFlag, MavState, MavType};
+use protocol::log::record::Record;
 use protocol::log::v1::Telemetry;
 
-use super::{Action, commands, frames, keys, pad, vehicle_changes};
+use super::{commands, frames, keys, pad, vehicle_changes};
 use crate::model::{
-    LinkState, Model, Role, Speaker, dead_reckoning::may_have_left, is_on_pad, link_hints, note_trace,
+    Action, LinkState, Model, Role, dead_reckoning::may_have_left, is_on_pad, link_hints, note_trace,
 };
 
 const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
@@ -20,8 +18,6 @@ const FAST_HEARTBEAT_EVERY: Duration = Duration::from_millis(100);
 const TIMESYNC_EVERY: Duration = Duration::from_secs(5);
 /// For a vehicle whose answers are the only proof of the uplink.
 const PROVING_TIMESYNC_EVERY: Duration = Duration::from_secs(1);
-/// Number of requests that may wait for an answer: of 10 s, one a second and those of a range test.
-const TIMESYNC_STAMPS_MAX: usize = 64;
 const SEEMS_OLD: Duration = Duration::from_secs(1);
 const TELEMETRY_RECORD_EVERY: Duration = Duration::from_millis(100);
 /// Silence of an armed vehicle after which the station reports its downlink as lost. The vehicle
@@ -45,7 +41,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     let often = seems_old || !model.link.uplink.is_reported;
     let timesync_every = if often { PROVING_TIMESYNC_EVERY } else { TIMESYNC_EVERY };
     if has_vehicle && is_due(&mut model.due.timesync, timesync_every, now) {
-        request_time(model, i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
+        model.request_time(i64::try_from(now.as_nanos()).unwrap_or(i64::MAX));
     }
     for text in model.texts.expire(now) {
         frames::add_vehicle_text(model, &text, now);
@@ -86,18 +82,6 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
         model.info(now, why);
         model.outbox.push(Action::Quit);
     }
-}
-
-/// Requests the vehicle's time; the answer repeats this stamp, ns.
-pub(super) fn request_time(model: &mut Model, stamp: i64) {
-    model.link.timesync_stamps.truncate(TIMESYNC_STAMPS_MAX - 1);
-    model.link.timesync_stamps.push_front(stamp);
-    model.outbox.push(Action::send(MavMessage::TIMESYNC(TIMESYNC_DATA {
-        tc1: 0,
-        ts1: stamp,
-        target_system: model.settings.vehicle.system_id,
-        target_component: model.settings.vehicle.component_id,
-    })));
 }
 
 /// Counts from the time that was due, so that late ticks do not lower the rate.
@@ -152,7 +136,7 @@ fn note_loss(model: &mut Model, now: Duration) {
     {
         model.link.loss_reported = true;
         let text = format!("LINK LOST: no telemetry for {:.1} s", age.as_secs_f64());
-        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+        model.error(now, text);
     }
 }
 
@@ -189,9 +173,8 @@ pub(super) fn store_place(model: &mut Model, now: Duration) {
         return;
     }
     model.place_due = Some(now + PLACE_STORED_EVERY);
-    let Some(place) = model.last_place(now).filter(|place| model.place.as_ref() != Some(place)) else {
-        return;
-    };
+    let place = model.last_place(now).filter(|place| model.place.as_ref() != Some(place));
+    let Some(place) = place else { return };
     model.place = Some(place);
     if model.settings.role == Role::Station {
         model.outbox.push(Action::StorePlace(Box::new(place)));

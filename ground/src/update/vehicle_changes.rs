@@ -7,11 +7,11 @@ use protocol::dialect::{MavMessage, TD_BOOK_KEPT_DATA, TD_CREW_DATA, TdAct, TdHo
 use protocol::identity::Address;
 use protocol::log::record::EventLevel;
 
-use super::{Action, commands, pad};
+use super::{commands, pad};
 use crate::model::{
-    Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, History, KeepAway, Model, RestOfWord,
-    Role, Sample, Seat, Speaker, TIMELINE_MAX, Uplink, Vehicle, Verdict, hold_words, is_aborted, is_flight,
-    is_on_pad, latch_words, words,
+    Action, Approach, CommandKind, Danger, Ending, FlightSoFar, FlownMission, History, KeepAway, Model,
+    RestOfWord, Role, Sample, Seat, Speaker, TIMELINE_MAX, Uplink, Vehicle, Verdict, hold_words, is_aborted,
+    is_flight, is_on_pad, latch_words, words,
 };
 
 /// The part of the vehicle's state whose changes are reported.
@@ -124,7 +124,7 @@ pub(super) fn note_reset(model: &mut Model, did: &'static str, now: Duration) {
         return;
     }
     let text = format!("the flight computer has restarted{did}");
-    model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+    model.error(now, text);
     model.rebooted = Some((did, now));
     model.outbox.push(Action::SyncLog);
 }
@@ -171,9 +171,9 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
         model.info(now, if armed { "armed (HEARTBEAT)" } else { "disarmed (HEARTBEAT)" });
     }
     // Only a restart leads there.
-    let is_in_its_test =
+    let tests_itself =
         |status: Option<(TdPhase, bool)>| status.map(|(phase, _)| phase == TdPhase::TD_PHASE_SAFE);
-    if (is_in_its_test(before.status), is_in_its_test(after.status)) == (Some(false), Some(true)) {
+    if (tests_itself(before.status), tests_itself(after.status)) == (Some(false), Some(true)) {
         note_reset(model, before.words_of_reset(), now);
     }
     if let Some(phase) = after.phase
@@ -187,7 +187,7 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     if after.aborted && !before.aborted {
         model.outcome.aborted_at = Some(now);
         let words = latch_words(model).unwrap_or_else(|| "ABORT LATCHED".to_owned());
-        model.add_event(now, Speaker::Ground, EventLevel::Error, format!("the vehicle reports {words}"));
+        model.error(now, format!("the vehicle reports {words}"));
         model.outbox.push(Action::SyncLog);
     }
     if let Some(verdict) = after.verdict
@@ -198,7 +198,7 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
     if after.hold != before.hold
         && let Some(text) = hold_words(&model.vehicle, model.link.uplink.armed_by_us)
     {
-        model.add_event(now, Speaker::Ground, EventLevel::Error, text);
+        model.error(now, text);
         model.outbox.push(Action::SyncLog);
     }
 }
@@ -266,9 +266,8 @@ const SENT_EVERY: Duration = Duration::from_secs(2);
 
 /// Sends the end again while telemetry arrives and the vehicle has not confirmed it.
 pub(super) fn send_book_end(model: &mut Model, now: Duration) {
-    let Some(head) = model.book.head.filter(|signed| signed.head.entries > model.book.confirmed) else {
-        return;
-    };
+    let confirmed = model.book.confirmed;
+    let Some(head) = model.book.head.filter(|signed| signed.head.entries > confirmed) else { return };
     let due = model.book.sent_at.is_none_or(|at| now.saturating_sub(at) >= SENT_EVERY);
     if due && model.link.state(now).carries() {
         model.book.sent_at = Some(now);

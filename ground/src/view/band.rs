@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::layout::Rect;
-use ratatui::text::Line;
+use ratatui::text::{Line, Span};
 
 use super::theme::Ink;
 use super::{STALE_MARK, TextRole, Theme, draw_line, fixed};
@@ -59,19 +59,13 @@ pub fn word(label: &str, text: &str, role: TextRole) -> Item {
 }
 
 /// A number with its name and unit; the name of a stale one is marked.
-pub fn number(
-    label: &str,
-    sample: Option<Sample<f64>>,
-    decimals: usize,
-    letters: u16,
-    now: Duration,
-) -> Item {
-    let (mark, role) = match sample {
+pub fn number(label: &str, value: Option<Sample<f64>>, decimals: usize, letters: u16, now: Duration) -> Item {
+    let (mark, role) = match value {
         None => ("", TextRole::Label),
-        Some(sample) if sample.is_stale(now) => (STALE_MARK, TextRole::Stale),
+        Some(value) if value.is_stale(now) => (STALE_MARK, TextRole::Stale),
         Some(_) => ("", TextRole::Title),
     };
-    let text = |decimals| sample.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, decimals));
+    let text = |decimals| value.map_or_else(|| "--".to_owned(), |value| fixed(value.value, decimals));
     // A number too long for its place loses its decimals, never its first digits.
     let fits = |text: &String| text.len() <= usize::from(letters);
     let text = Some(text(decimals)).filter(fits).or_else(|| Some(text(0)).filter(fits));
@@ -194,9 +188,9 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
         // Small halves of a row cannot be distinguished in ASCII.
         let spaced: String = item.text.chars().flat_map(|letter| [letter, ' ']).collect();
         let middle = Rect { y: at.y + 1, height: 1, ..at }.intersection(at);
-        return draw_line(frame, middle, Line::styled(spaced, style));
+        return draw_line(frame, middle, Line::from(Span::styled(spaced, style)));
     }
-    if item.role == TextRole::Alarm {
+    if style.bg.is_some() || item.role == TextRole::Alarm {
         // Its background is one area, or the letters look torn.
         let ground = Rect { width: (item.pixels * width).min(at.width), ..at };
         frame.buffer_mut().set_style(ground, style);

@@ -10,7 +10,7 @@ use ratatui::text::{Line, Span};
 
 use super::panels::{decimals, limit_rows};
 use super::theme::Ink;
-use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, pages, shortest};
+use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest, widgets};
 use crate::model::{Deflection, Gimbal, Model, Sample, Verdict, words};
 
 /// Position of the limit on a bar, as a share, so that an excess can be seen.
@@ -59,7 +59,7 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let is_judged = judged.is_some();
     let title = if is_judged { "touchdown" } else { "touchdown predicted" };
     let Some(at) = judged.or(predicted) else {
-        let inside = pages::framed(title, Line::default(), theme, frame, area);
+        let inside = widgets::framed(title, Line::default(), theme, frame, area);
         return draw_line(frame, inside, theme.line(" no prediction", TextRole::Label));
     };
     let in_table_2 = |verdict: Sample<Verdict>| verdict.value.landing.contains(TdLanding::TD_LANDING_TABLE_2);
@@ -71,8 +71,8 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     };
     let words = Some(words).filter(|words| words.width() + title.len() + 4 <= usize::from(area.width));
     let words = words.unwrap_or_default();
-    let inside = pages::framed(title, words, theme, frame, area);
-    let (mark, role) = if is_judged { (" ", TextRole::Plain) } else { age_mark(&at, now) };
+    let inside = widgets::framed(title, words, theme, frame, area);
+    let (mark, role) = if is_judged { (" ", TextRole::Plain) } else { age_mark(&at, now, TextRole::Plain) };
     let ink = theme.ground().fg(theme.ink(if is_judged { Ink::Measured } else { Ink::Predicted }));
     let limit_ink = theme.ground().fg(theme.ink(Ink::Limit));
     let limit_columns = if inside.width < NARROW { 0 } else { LIMIT_COLUMNS };
@@ -145,12 +145,11 @@ pub fn surfaces_line(model: &Model, theme: Theme, now: Duration) -> Line<'static
 /// Draws fins and gimbal: the measured angle as a bar, the commanded one as a mark.
 pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     let legend = legend([" ▄", " is "], ["│", " cmd "], theme);
-    let area = pages::framed("fins, gimbal", legend, theme, frame, area);
+    let area = widgets::framed("fins, gimbal", legend, theme, frame, area);
     let (fins, gimbal) = (model.vehicle.fins(), model.vehicle.gimbal());
     let limit_deg = model.vehicle.limits().map(|limits| f64::from(limits.gimbal_limit_rad).to_degrees());
     let limit_deg = limit_deg.filter(|limit| limit.is_finite() && *limit > 0.0).unwrap_or(20.0);
-    let fin =
-        |k: usize| (format!("fin {}", k + 1), fins.map(|fins| fins.map(|fins| fins[k])), [0.0, 90.0], 0);
+    let fin = |k: usize| (format!("fin {}", k + 1), fins.map(|of| of.map(|fins| fins[k])), [0.0, 90.0], 0);
     let plane = |name: &str, angles| (name.to_owned(), angles, [-limit_deg, limit_deg], 1);
     let rows = (0..4).map(fin).chain([
         plane("pitch", gimbal.map(|gimbal| gimbal.map(|gimbal| gimbal.pitch))),
@@ -158,7 +157,8 @@ pub fn draw_surfaces(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
     ]);
     for ((name, angles, [low, high], digits), y) in rows.zip(area.top()..area.bottom()) {
         let at = Rect { y, height: 1, ..area };
-        let (mark, role) = angles.as_ref().map_or((" ", TextRole::Label), |angles| age_mark(angles, now));
+        let (mark, role) =
+            angles.as_ref().map_or((" ", TextRole::Label), |angles| age_mark(angles, now, TextRole::Plain));
         let degrees = |pick: fn(&Deflection) -> f64| angles.map(|angles| pick(&angles.value).to_degrees());
         let (commanded, measured) = (degrees(|d| d.commanded_rad), degrees(|d| d.measured_rad));
         let text = measured.map_or_else(|| "--".to_owned(), |deg| fixed(deg, digits));

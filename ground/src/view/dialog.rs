@@ -37,10 +37,9 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
     }
     let cancels = || plain("Any other key cancels.".to_owned());
     let any_other_key = || plain("Any other key cancels. Nothing is sent before Enter.".to_owned());
-    let ours = model.role_of(model.operator_number()).filter(|_| model.people() == Some(2));
-    let proposes =
-        |ours| plain(format!("This is a request: {} must confirm within 10 s.", other_roles(ours)));
-    let next = || ours.map(proposes).into_iter().chain([any_other_key()]);
+    let ours = model.role_of(model.seat_key()).filter(|_| model.people() == Some(2));
+    let asks = |ours| plain(format!("This is a request: {} must confirm within 10 s.", other_roles(ours)));
+    let next = || ours.map(asks).into_iter().chain([any_other_key()]);
     // The lines above and below the line of the word.
     let (title, above, below) = match dialog.prompt {
         Prompt::Arm => ("ARM, step 2 of 2", Vec::new(), next().chain(checks(model, theme)).collect()),
@@ -48,9 +47,8 @@ pub fn dialog_lines(model: &Model, theme: Theme, now: Duration) -> Option<Titled
             ("START the countdown", Vec::new(), next().chain(model.loss_in_words().map(plain)).collect())
         }
         Prompt::Confirm(proposal) => {
-            let proposes =
-                plain(format!("{} requests to {}.", model.operator(proposal.by), proposal.act_name()));
-            ("CONFIRM another operator's request", vec![proposes], vec![any_other_key()])
+            let asks = plain(format!("{} requests to {}.", model.operator(proposal.by), proposal.act_name()));
+            ("CONFIRM another operator's request", vec![asks], vec![any_other_key()])
         }
         Prompt::TakeCommand => {
             let who = plain(format!("{} is in command, if the vehicle receives them.", commander(model)));
@@ -144,7 +142,7 @@ fn commander(model: &Model) -> String {
 fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
     let plain = |text: String| theme.line(text, TextRole::Plain);
     let strong = |text: String| theme.line(text, TextRole::Caution);
-    let ours = model.operator_number();
+    let ours = model.seat_key();
     if let Some(proposal) = model.proposal(now) {
         let (left_s, act) = (proposal.left.as_secs_f64(), proposal.act_name());
         let who = model.operator(proposal.by);
@@ -154,7 +152,7 @@ fn notice(model: &Model, theme: Theme, now: Duration) -> Option<Titled> {
             return Some(("REQUESTED", vec![plain(format!("You request to {act}.")), strong(words)]));
         }
         let key = if proposal.act == TdAct::TD_ACT_START { Act::Start } else { Act::Arm }.key_name();
-        let words = match model.proposal_to_confirm(now) {
+        let words = match model.open_proposal(now) {
             Some(_) if why_not_here(model).is_none() => strong(format!(
                 "Press {key} within {left_s:.0} s, then type {CONFIRM_WORD} and Enter to confirm."
             )),
@@ -188,8 +186,7 @@ fn checks(model: &Model, theme: Theme) -> Vec<Line<'static>> {
         return lines;
     }
     let mut lines = vec![theme.line("Failing checks; the vehicle will refuse:", TextRole::Alarm)];
-    lines
-        .extend(failing.into_iter().map(|(_, words)| theme.line(format!("  NO {words}"), TextRole::Caution)));
+    lines.extend(failing.into_iter().map(|(_, why)| theme.line(format!("  NO {why}"), TextRole::Caution)));
     lines
 }
 

@@ -14,8 +14,8 @@ use super::lists::crew_events;
 use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
-    Act, Event, KeepAway, Model, Page, dead_reckoning::is_silent, dead_reckoning::predicted_course,
-    is_burning, is_flight, is_on_pad, words,
+    Act, Event, KeepAway, Model, Page, Playback, dead_reckoning::is_silent, dead_reckoning::predicted_course,
+    flight_began, is_burning, is_flight, is_on_pad, words,
 };
 use crate::view::pictures::seconds_since;
 
@@ -32,8 +32,8 @@ pub fn message_rows(model: &Model, theme: Theme, now: Duration, columns: u16) ->
     // In flight nothing moves for it.
     let hidden = alarm.is_some() && model.vehicle.in_flight();
     // A message that the alarm contains needs no second row.
-    let alarm_words = alarm.as_ref().map(ToString::to_string).unwrap_or_default();
-    let is_new = |message: &Line| !alarm_words.contains(message.to_string().trim());
+    let alarmed = model.alarms.foremost().filter(|_| alarm.is_some()).map_or("", |alarm| &alarm.what.text);
+    let is_new = |message: &Line| !alarmed.contains(message.to_string().trim());
     let message = top_lines::message(model, theme, now, columns).filter(|words| !hidden && is_new(words));
     let is_flown = model.playing.is_some() || flight_began(model).is_some();
     let mut over: Vec<_> = message.into_iter().chain(alarm).collect();
@@ -69,15 +69,19 @@ const TO_COME: char = '┄';
 /// The pictures of a flight stand still this long after the touchdown.
 const STILL_AFTER: Duration = Duration::from_secs(2);
 
-/// When the flight began.
-pub fn flight_began(model: &Model) -> Option<Duration> {
-    model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
-}
-
 /// A flight is shown to this moment: to now, and on the ground not much longer than it lasted.
 pub fn shown_until(model: &Model, now: Duration) -> Duration {
     let mut flown = model.history.timeline.iter().skip_while(|(phase, _)| is_on_pad(*phase));
     flown.find(|(phase, _)| !is_flight(*phase)).map_or(now, |(_, at)| now.min(*at + STILL_AFTER))
+}
+
+/// When the picture of a recorded flight begins and ends: the flight fills it, not the time on the
+/// pad and the waiting after it.
+pub fn recorded(playing: &Playback) -> (Duration, Duration) {
+    let mut flown = playing.phases.iter().skip_while(|(phase, _)| is_on_pad(*phase));
+    let from = flown.next().map_or(Duration::ZERO, |(_, at)| at.saturating_sub(STILL_AFTER));
+    let down = flown.find(|(phase, _)| !is_flight(*phase));
+    (from, down.map_or(playing.length, |(_, at)| playing.length.min(*at + STILL_AFTER)))
 }
 
 /// The events that the vehicle predicts, with their times.
@@ -111,11 +115,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let to_come = expected(model, now);
     let (phases, from, length_s): (&[(TdPhase, Duration)], Duration, f64) =
         if let Some(playing) = &model.playing {
-            // The flight fills the line, not the time on the pad and the waiting after it.
-            let mut flown = playing.phases.iter().skip_while(|(phase, _)| is_on_pad(*phase));
-            let from = flown.next().map_or(Duration::ZERO, |(_, at)| at.saturating_sub(STILL_AFTER));
-            let down = flown.find(|(phase, _)| !is_flight(*phase));
-            let until = down.map_or(playing.length, |(_, at)| playing.length.min(*at + STILL_AFTER));
+            let (from, until) = recorded(playing);
             (&playing.phases, from, until.saturating_sub(from).as_secs_f64().max(1.0))
         } else {
             let from = flight_began(model).unwrap_or(now);
@@ -142,15 +142,12 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
         let after = phases.get(place + 1).map(|(phase, _)| *phase);
         let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
-        let is_only_commanded = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
+        let commanded = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
         let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
-        let name = if is_only_commanded {
-            "ignition commanded"
-        } else {
-            words::event_of(*phase).filter(|_| !again)?
-        };
+        let name =
+            if commanded { "ignition commanded" } else { words::event_of(*phase).filter(|_| !again)? };
         Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.
@@ -182,8 +179,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         let is_free = |row: &[(char, Ink)], at: usize, before: usize| {
             let letter = |place: usize| row.get(place).map_or(' ', |(letter, _)| *letter);
             let blank = |place| [' ', PASSED, TO_COME, EVENT].contains(&letter(place));
-            let apart =
-                [at.wrapping_sub(1), at + length].iter().all(|place| !letter(*place).is_alphanumeric());
+            let apart = [at.wrapping_sub(1), at + length].iter().all(|at| !letter(*at).is_alphanumeric());
             apart && at + length <= columns && (at.saturating_sub(before)..at + length).all(blank)
         };
         let free = |(row, at, before): (usize, Option<usize>, usize)| {

@@ -8,10 +8,10 @@ use super::panels::ending_role;
 use super::pictures::map::comes_down;
 use super::top_lines::readiness;
 use super::{STALE_MARK, TextRole};
+use crate::model::dead_reckoning::{is_silent, may_have_left, predict_position};
 use crate::model::{
-    AlarmKind, Approach, Ending, Model, Sample, Spot,
-    dead_reckoning::{is_silent, may_have_left, predict_position},
-    hold_words, is_burning, is_liftoff_by_itself, is_on_pad, why_not_here,
+    AlarmKind, Approach, Ending, Model, Sample, Spot, hold_words, is_burning, is_liftoff_by_itself,
+    is_on_pad, why_not_here,
 };
 use protocol::dialect::{TdInterlock, TdPhase};
 
@@ -132,8 +132,8 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let Some(status) = vehicle.status.as_ref().filter(|status| !status.is_stale(now)) else {
         return word("NO DATA", TextRole::Caution);
     };
-    let taps = model.tapping(now).is_some_and(|(by, _)| by == model.operator_number())
-        && why_not_here(model).is_none();
+    let taps =
+        model.tapping(now).is_some_and(|(by, _)| by == model.seat_key()) && why_not_here(model).is_none();
     let left = vehicle.countdown_s().filter(|left| left.value > 0.0);
     // A vehicle that was reset while it was armed may do it again.
     let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());

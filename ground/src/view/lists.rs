@@ -7,8 +7,8 @@ use protocol::log::record::EventLevel;
 use ratatui::text::{Line, Span};
 use textwrap::{Options, WordSeparator, WordSplitter};
 
-use super::{TextRole, Theme, fixed, footer::flight_began};
-use crate::model::{Event, Mark, Model, Step, StepState, role_name, words};
+use super::{TextRole, Theme, fixed};
+use crate::model::{Event, Mark, Model, Step, StepState, flight_began, role_name, words};
 use crate::view::pictures::seconds_since;
 
 /// Columns before the text of an event: time, speaker and mark.
@@ -168,9 +168,7 @@ fn below(step: &Step) -> String {
     let signer = |by: &str| if by.is_empty() { "somebody".to_owned() } else { by.to_owned() };
     match &step.mark {
         Mark::Open => format!("{who} signs{limits}"),
-        Mark::Signed(signature) => {
-            format!("signed by {}, {}", signer(&signature.by), clock(signature.unix_s))
-        }
+        Mark::Signed(signed) => format!("signed by {}, {}", signer(&signed.by), clock(signed.unix_s)),
         Mark::Voided(signature) => {
             format!("voided by {}, {}; {who} signs", signer(&signature.by), clock(signature.unix_s))
         }

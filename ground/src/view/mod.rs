@@ -16,6 +16,7 @@ pub mod lists;
 pub mod pages;
 pub mod panels;
 pub mod pictures;
+pub mod shared;
 pub mod status_lines;
 pub mod theme;
 pub mod top_lines;

@@ -7,11 +7,8 @@ use protocol::dialect::{TD_TOUCHDOWN_LIMITS_DATA, TdControlLevel, TdLanding, TdL
 use ratatui::text::Line;
 
 use super::{TextRole, Theme, fixed, seconds, shortest};
-use crate::model::{
-    Ending, LIMITS, Model, Sample, Touchdown, Verdict,
-    dead_reckoning::{Basis, predict_position},
-    words,
-};
+use crate::model::dead_reckoning::{Basis, predict_position};
+use crate::model::{Ending, LIMITS, Model, Sample, Touchdown, Verdict, words};
 
 /// What steers the burn.
 pub fn steered(level: TdControlLevel) -> (String, TextRole) {
@@ -55,15 +52,16 @@ pub struct LimitRow {
     pub used: f64,
     /// Whether the limit is met, as the vehicle reports it.
     pub is_met: bool,
-    /// The limit of the landing paper's Table 2, in the same unit.
+    /// The limit of the landing paper's Table 2, in the same unit. The vehicle judges speed and
+    /// rotation along its axis; `value` is over the ground, so near the limit the two may differ.
     pub table_2: f64,
 }
 
-/// Limits of the landing paper's Table 2, m, m, m/s, m/s, deg, deg/s.
+/// Limits of the landing paper's Table 2, m, m, m/s, m/s, deg, deg/s. No message carries them.
 const TABLE_2: [f64; 6] = [20.0, 0.2, 0.4, 0.1, 5.0, 2.0];
 
-/// A touchdown, the fence, and the design envelope of the legs. Limits and judgement are the
-/// vehicle's.
+/// A touchdown against the fence and the design envelope of the legs, as the vehicle limits and
+/// judges it.
 pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
     let reported = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
         limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
@@ -162,6 +160,18 @@ mod limit_rows_tests {
         let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
         assert_eq!(words(None), ["", "", "-- m/s", "-- m/s", "-- deg", "-- deg/s"]);
         assert_eq!(words(Some(&LIMITS)), ["±120 m", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);
+    }
+
+    #[test]
+    fn table_2_has_the_limits_by_which_the_vehicle_judges() {
+        use flight::rules::verdict::TABLE_2 as OF_THE_VEHICLE;
+        let flight::rules::verdict::Touchdown { distance_m, height_m, vertical_m_s, .. } = OF_THE_VEHICLE;
+        let flight::rules::verdict::Touchdown { lateral_m_s, tilt_rad, rate_rad_s, .. } = OF_THE_VEHICLE;
+        let [tilt_deg, rate_deg_s] = [tilt_rad, rate_rad_s].map(f64::to_degrees);
+        let expected = [distance_m, height_m, vertical_m_s, lateral_m_s, tilt_deg, rate_deg_s];
+        for (row, expected) in limit_rows(&at(0.0), None).iter().zip(expected) {
+            assert!((row.table_2 - expected).abs() < 1e-9, "{}: {} {expected}", row.name, row.table_2);
+        }
     }
 
     #[test]

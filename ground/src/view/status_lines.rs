@@ -84,8 +84,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
     }
     let descent = vehicle.descent();
     let left_s = vehicle.ignition_in_s(now).map(|left| left.value);
-    let chosen_m =
-        descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|height_m| height_m.is_finite());
+    let chosen_m = descent.map(|d| f64::from(d.value.chosen_height_m)).filter(|m| m.is_finite());
     let at = chosen_m.map_or_else(String::new, |height_m| format!(" at {} m", fixed(height_m, 0)));
     let armed = if phase == TdPhase::TD_PHASE_LAND_ARMED { ", motor armed" } else { ", motor not armed" };
     ("IGNITION".to_owned(), within(left_s), format!("{at}{armed}"))
@@ -93,7 +92,7 @@ fn ignition(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> (String, String
 
 /// Until the canopy carries the vehicle the time is unknown: it falls fast, and soon slower.
 fn under_chute(vehicle: &Vehicle, now: Duration) -> (String, String, String) {
-    let live = vehicle.status.as_ref().is_some_and(|status| status.value.motor == TdMotor::TD_MOTOR_LIVE);
+    let live = vehicle.reports(|status| status.motor == TdMotor::TD_MOTOR_LIVE);
     let motor = if live { ", LIVE MOTOR" } else { "" };
     let Some(descent) = vehicle.descent().filter(|d| d.value.chute == TdChute::TD_CHUTE_OPEN) else {
         return ("chute opens".to_owned(), String::new(), format!(", still fast{motor}"));

@@ -99,6 +99,8 @@ struct Colours {
     label: u8,
     good: u8,
     caution: u8,
+    /// In the light theme no letter of a warning colour is dark enough: its ground has the colour.
+    caution_ground: Option<u8>,
     border: u8,
     /// In the order of [`Ink`].
     inks: [u8; 6],
@@ -113,6 +115,7 @@ const DARK: Colours = Colours {
     label: 249,
     good: 79,
     caution: 215,
+    caution_ground: None,
     border: 240,
     inks: [75, 221, 218, 255, 215, 249],
     levels: [(231, 238), (16, 214), (231, 124), (16, 79)],
@@ -123,19 +126,20 @@ const LIGHT: Colours = Colours {
     plain: 16,
     label: 239,
     good: 22,
-    caution: 88,
+    caution: 16,
+    caution_ground: Some(214),
     border: 246,
-    inks: [19, 23, 90, 16, 88, 239],
+    inks: [19, 23, 90, 16, 52, 239],
     levels: [(231, 239), (16, 214), (231, 124), (231, 22)],
 };
 
 /// The numbers of the palettes but 231, which stays white, and what a terminal of 24 bits shows for
 /// each: red, green and blue.
 const NUMBERS: [u8; 22] =
-    [16, 19, 22, 23, 75, 79, 88, 90, 124, 195, 214, 215, 218, 221, 233, 234, 238, 239, 240, 246, 249, 255];
+    [16, 19, 22, 23, 52, 75, 79, 90, 124, 195, 214, 215, 218, 221, 233, 234, 238, 239, 240, 246, 249, 255];
 #[expect(clippy::unreadable_literal, reason = "two digits each for red, green and blue")]
 const TRUE_COLOURS: [u32; NUMBERS.len()] = [
-    0x0b0f14, 0x00449e, 0x005c38, 0x7a4300, 0x74c0ff, 0x63d8a4, 0x7d4000, 0x8c1273, 0xa31a14, 0xeef2f5,
+    0x0b0f14, 0x00449e, 0x005c38, 0x7a4300, 0x4a0d00, 0x74c0ff, 0x63d8a4, 0x8c1273, 0xa31a14, 0xeef2f5,
     0xffb000, 0xffb454, 0xf2a0d8, 0xffd866, 0x0b0f14, 0x141b23, 0x3b4753, 0x44505b, 0x44525f, 0x98a4af,
     0xa3b0bd, 0xf0f4f8,
 ];
@@ -214,16 +218,18 @@ impl Theme {
 
     /// The style of a role. A letter's weight and slant say the same without colour.
     pub fn style(self, role: TextRole) -> Style {
-        let coloured = self.palette.colours().map(|colours| match role {
+        let given = self.palette.colours().map(|colours| match role {
             TextRole::Plain | TextRole::Stale | TextRole::Title | TextRole::Key => ink(colours.plain),
             // Paler than a value, and still readable in the sun: 7:1.
             TextRole::Label => ink(colours.label),
             TextRole::Good => ink(colours.good),
-            TextRole::Caution => ink(colours.caution),
+            TextRole::Caution => {
+                let letter = ink(colours.caution);
+                colours.caution_ground.map_or(letter, |ground| letter.bg(Color::Indexed(ground)))
+            }
             TextRole::Alarm => on(colours.levels[Level::Danger as usize]),
         });
-        let style =
-            coloured.unwrap_or_else(|| if role == TextRole::Alarm { reversed() } else { Style::new() });
+        let style = given.unwrap_or_else(|| if role == TextRole::Alarm { reversed() } else { Style::new() });
         match role {
             TextRole::Plain | TextRole::Label | TextRole::Good => style,
             TextRole::Stale => style.add_modifier(Modifier::ITALIC),

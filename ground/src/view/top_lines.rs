@@ -13,12 +13,14 @@ use ratatui::style::Modifier;
 use ratatui::text::{Line, Span};
 
 use super::theme::Level;
-use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, lists, shortest, side_by_side, status_lines};
+use super::{
+    STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, lists, shortest, side_by_side, status_lines,
+};
 use crate::model::{
-    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, Model, Page, Role,
-    STALE_AFTER, Sample, Standing, TERMINATION, TrackedCommand, abort_too_late,
-    dead_reckoning::may_have_left, foreign_name, hold_words, is_liftoff_by_itself, is_on_pad, standing,
-    why_no_go, words,
+    Acknowledgement, AlarmKind, Approach, CommandKind, Ending, Event, LinkState, MARGIN_LEAST_DB, Model,
+    Page, Role, STALE_AFTER, Sample, Standing, TERMINATION, TrackedCommand, abort_too_late,
+    dead_reckoning::may_have_left, foreign_name, hold_words, is_liftoff_by_itself, is_on_pad,
+    quantity::Quantity, standing, why_no_go, words,
 };
 
 /// Columns of the state: armed, phase, clock, each in its place.
@@ -41,19 +43,45 @@ pub fn draw_identity(model: &Model, theme: Theme, now: Duration, frame: &mut Fra
         right.extend([theme.span(words, TextRole::Alarm), Span::raw(" ")]);
     }
     if shows_rates {
-        let capacity =
-            model.settings.link_capacity_bytes_s.map_or_else(String::new, |most| format!("/{most}"));
+        let capacity = model.settings.link_capacity_bytes_s.map_or_else(String::new, |of| format!("/{of}"));
         let received = format!(" rx {:.0}{capacity} B/s", model.link.stats.figures(now).rx_bytes_s);
         let loss = model.link.loss(now);
         let lost = format!("  loss {}  ", status_lines::percent(loss));
         right.extend([theme.plain(received), theme.span(lost, status_lines::loss_role(loss))]);
     }
-    right.extend(link(model, theme, now).spans);
-    right.push(status_lines::recording(model, theme, now));
+    let state = [link(model, theme, now).spans, vec![status_lines::recording(model, theme, now)]].concat();
+    let left = identity(model, theme, now);
+    let spans = || right.iter().chain(&state);
+    let taken = left.width() + spans().map(Span::width).sum::<usize>();
+    let fits = |words: &Span| taken + words.width() <= usize::from(area.width);
+    right.extend(radio(model, theme, now).into_iter().find(fits));
+    right.extend(state);
     let right = Line::from(right);
     let [left_area, right_area] = side_by_side(area, [Fill(1), Length(right.width() as u16)]);
-    draw_line(frame, left_area, identity(model, theme, now));
+    draw_line(frame, left_area, left);
     draw_line(frame, right_area, right);
+}
+
+/// A change of the margin within a minute that counts as a trend, dB.
+const TREND_DB: f64 = 1.0;
+
+/// Signal strength and margin of the radio with the margin's trend over the last minute, the
+/// longest words first; empty without a report of the radio.
+fn radio(model: &Model, theme: Theme, now: Duration) -> Vec<Span<'static>> {
+    let read = |name| Quantity::named(name).and_then(|quantity| quantity.read(model, now));
+    let (Some(rssi), Some(margin)) = (read("rssi"), read("radio margin")) else { return Vec::new() };
+    let rise = Quantity::named("radio margin").and_then(|margin| model.history.trace.rise(margin, now));
+    let arrow = match rise {
+        None => "",
+        Some(rise_db) if rise_db >= TREND_DB => "↑",
+        Some(rise_db) if rise_db <= -TREND_DB => "↓",
+        Some(_) => "→",
+    };
+    let role = if margin.value < MARGIN_LEAST_DB { TextRole::Caution } else { TextRole::Plain };
+    let (rssi, margin) = (fixed(rssi.value, 0), fixed(margin.value, 0));
+    let words =
+        [format!("rssi {rssi} dBm margin {margin} dB{arrow}"), format!("{rssi} dBm +{margin} dB{arrow}")];
+    words.map(|words| theme.span(format!(" {words}  "), role)).into()
 }
 
 /// The present danger of the vehicle, as far as it is reported.
@@ -85,12 +113,8 @@ pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     let [state, middle, abort_area] =
         side_by_side(first, [Length(STATE_COLUMNS.iter().sum()), Fill(1), Length(abort_columns)]);
     let words = [armed(model, theme, now), phase(model, theme, now), countdown(model, theme, now)];
-    let in_place = |(words, columns): (Span, u16)| format!("{:1$.1$}", words.content, usize::from(columns));
-    draw_line(
-        frame,
-        state,
-        Line::from(words.into_iter().zip(STATE_COLUMNS).map(in_place).collect::<String>()),
-    );
+    let field = |(words, columns): (Span, u16)| format!("{:1$.1$}", words.content, usize::from(columns));
+    draw_line(frame, state, Line::from(words.into_iter().zip(STATE_COLUMNS).map(field).collect::<String>()));
     if let Some(line) = in_the_middle(model, theme, now, usize::from(middle.width)) {
         draw_line(frame, middle, line);
     }
@@ -190,7 +214,7 @@ fn crew(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
         return theme.span(" NO STATION", TextRole::Alarm);
     }
     if let Some(people) = model.people() {
-        let who = match model.operator_number() {
+        let who = match model.seat_key() {
             0 if model.settings.role == Role::Attached && model.key_number() > 0 => {
                 "HOLD/ABORT ONLY".to_owned()
             }
@@ -251,8 +275,7 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
             theme.span(" IN THE AIR?", TextRole::Alarm)
         }
         Some(phase) => {
-            let (mark, stale) = age_mark(&phase, now);
-            let role = if stale == TextRole::Stale { stale } else { TextRole::Title };
+            let (mark, role) = age_mark(&phase, now, TextRole::Title);
             theme.span(format!("{mark}{}", doing(model, phase.value)), role)
         }
     }
@@ -270,17 +293,10 @@ pub fn doing(model: &Model, phase: TdPhase) -> String {
 
 /// Whether the vehicle is armed, from HEARTBEAT.
 pub fn armed(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
-    match model.vehicle.armed() {
-        None => theme.label(" armed ?"),
-        Some(armed) => {
-            let (mark, stale) = age_mark(&armed, now);
-            match (armed.value, stale) {
-                (true, _) => theme.span(format!("{mark}ARMED"), TextRole::Alarm),
-                (false, TextRole::Stale) => theme.span(format!("{mark}disarmed"), TextRole::Stale),
-                (false, _) => theme.span(format!("{mark}disarmed"), TextRole::Good),
-            }
-        }
-    }
+    let Some(armed) = model.vehicle.armed() else { return theme.label(" armed ?") };
+    let (mark, role) = age_mark(&armed, now, TextRole::Good);
+    let (word, role) = if armed.value { ("ARMED", TextRole::Alarm) } else { ("disarmed", role) };
+    theme.span(format!("{mark}{word}"), role)
 }
 
 /// The present time to release, s: it runs on between two reports while a report is fresh, and
@@ -303,9 +319,8 @@ pub fn countdown(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
             theme.span(words, TextRole::Stale)
         }
         Some(time) => {
-            let (mark, role) = age_mark(&time, now);
+            let (mark, role) = age_mark(&time, now, TextRole::Title);
             let sign = if time.value > 0.0 { '-' } else { '+' };
-            let role = if role == TextRole::Stale { role } else { TextRole::Title };
             theme.span(format!("{mark}T{sign}{:.1}", clock_s(model, time, now).abs()), role)
         }
     }
@@ -436,7 +451,7 @@ fn facts(track: &TrackedCommand, names: [&str; 3], theme: Theme, now: Duration) 
     let (acknowledged, acknowledged_role) = match track.acknowledged {
         Acknowledgement::Waiting => ("waiting".to_owned(), TextRole::Caution),
         Acknowledgement::InProgress => ("in progress".to_owned(), TextRole::Caution),
-        Acknowledgement::AwaitsConfirmation => ("requested, not confirmed".to_owned(), TextRole::Caution),
+        Acknowledgement::Proposed => ("requested, not confirmed".to_owned(), TextRole::Caution),
         Acknowledgement::GivenUp => ("NEVER".to_owned(), TextRole::Alarm),
         Acknowledgement::Answered(_) if track.accepted() => ("accepted".to_owned(), TextRole::Good),
         Acknowledgement::Answered(result) => (format!("REFUSED ({})", refusal(result)), TextRole::Alarm),

@@ -1,10 +1,14 @@
-//! Rows of numbers, and scales.
+//! Rows of numbers, scales, and the borders of panels.
 
 use std::time::Duration;
 
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout, Rect, Spacing};
+use ratatui::symbols::merge::MergeStrategy;
 use ratatui::text::Line;
+use ratatui::widgets::Block;
 
-use super::{TextRole, Theme};
+use super::{TextRole, Theme, draw_lines};
 pub use crate::model::words::{fixed, shortest};
 use crate::model::{Model, Sample, quantity::Quantity};
 
@@ -15,8 +19,8 @@ const VALUE_WIDTH: usize = 9;
 const LABEL_WIDTH: usize = 17;
 
 /// The mark and the role of a value by its age.
-pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole) {
-    if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", TextRole::Plain) }
+pub fn age_mark<T>(sample: &Sample<T>, now: Duration, fresh: TextRole) -> (&'static str, TextRole) {
+    if sample.is_stale(now) { (STALE_MARK, TextRole::Stale) } else { (" ", fresh) }
 }
 
 /// A row with the name, the value and the unit of a quantity. A stale value is marked; a missing
@@ -24,7 +28,7 @@ pub fn age_mark<T>(sample: &Sample<T>, now: Duration) -> (&'static str, TextRole
 pub fn quantity_row(quantity: &Quantity, model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let value = quantity.read(model, now);
     let text = value.map_or_else(|| "--".to_owned(), |sample| fixed(sample.value, quantity.decimals));
-    let age = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now));
+    let age = value.map_or((" ", TextRole::Label), |sample| age_mark(&sample, now, TextRole::Plain));
     text_row(theme, quantity.name, age, &text, quantity.unit)
 }
 
@@ -62,6 +66,37 @@ pub fn ticks(from: f64, to: f64, step: f64) -> impl Iterator<Item = f64> {
     // A scale of more ticks than columns would be an error of the caller; it must not hang.
     let count = (last - first + 1.0).clamp(0.0, 1_000.0) as u32;
     (0..count).map(move |k| (first + f64::from(k)) * step)
+}
+
+// Panels.
+
+/// Splits an area into panels beside each other, which share a border.
+pub fn columns<const N: usize>(area: Rect, columns: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::horizontal(columns).spacing(Spacing::Overlap(1)))
+}
+
+/// Splits an area into panels above each other, which share a border.
+pub fn rows<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
+    area.layout(&Layout::vertical(rows).spacing(Spacing::Overlap(1)))
+}
+
+/// Draws the border of a panel with its title, and what stands at the right end of it. Returns its
+/// inside.
+pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
+    let title = theme.line(format!(" {title} "), TextRole::Title);
+    let block = Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact);
+    let block = block.title(title);
+    let block = if right.width() == 0 { block } else { block.title(right.right_aligned()) };
+    let inside = block.inner(area);
+    frame.render_widget(block, area.intersection(frame.area()));
+    inside
+}
+
+/// A panel with lines.
+pub fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
+    let inside = framed(title, Line::default(), theme, frame, area);
+    // The most important first; the rest is on the page of all values.
+    draw_lines(frame, inside, &lines[..lines.len().min(usize::from(inside.height))]);
 }
 
 #[cfg(test)]

@@ -273,6 +273,49 @@ fn the_light_theme_is_dark_on_white_without_yellow() {
     assert!(!is_red(predicted.map(true_colour)));
 }
 
+#[test]
+fn in_the_light_theme_caution_alarm_and_flame_have_three_colours() {
+    let theme = Theme { palette: Palette::Light, ascii: false };
+    let colours =
+        [theme.style(TextRole::Caution).bg, theme.style(TextRole::Alarm).bg, Some(theme.ink(Ink::Flame))];
+    for shown in [std::convert::identity, true_colour] {
+        let [caution, alarm, flame] = colours.map(|colour| rgb(shown(colour.unwrap())).unwrap());
+        for (one, other) in [(caution, alarm), (caution, flame), (alarm, flame)] {
+            let apart: u32 = one.iter().zip(other).map(|(one, other)| u32::from(one.abs_diff(other))).sum();
+            assert!(apart >= 80, "{one:?} {other:?}");
+        }
+    }
+}
+
+/// A held countdown is stated on its page and in the row of its alarm, and not in a third one.
+#[test]
+fn a_hold_is_stated_once_on_the_page_and_once_as_an_alarm() {
+    let screen = held().screen(80, 24);
+    assert_eq!(screen.matches("HOLD: accelerometer").count(), 2, "{screen}");
+}
+
+/// The ground of large letters of danger is one area.
+#[test]
+fn large_letters_of_danger_have_one_ground() {
+    for palette in [Palette::Dark, Palette::Light] {
+        let theme = Theme { palette, ascii: false };
+        let buffer = drawn(&held(), SIZES[0], palette);
+        let alarm = theme.style(TextRole::Alarm).bg;
+        // HOLD is 20 columns wide, and as many rows high as its letters.
+        for (column, row) in (1..20).flat_map(|column| (4..7).map(move |row| (column, row))) {
+            assert_eq!(Some(buffer[(column, row)].bg), alarm, "{palette:?} {column} {row}");
+        }
+    }
+}
+
+#[test]
+fn a_large_pad_page_lists_every_check() {
+    let screen = on_the_pad().screen(200, 60);
+    for name in ["abort latch", "self test", "igniter", "controller warm", "uplink", "battery"] {
+        assert!(screen.contains(name), "{name}: {screen}");
+    }
+}
+
 /// Every colour of letters and pictures of a theme.
 fn inks(theme: Theme) -> Vec<Color> {
     use TextRole::{Caution, Good, Key as OfKeys, Label, Plain, Stale, Title};

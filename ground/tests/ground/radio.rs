@@ -43,6 +43,37 @@ fn a_radio_that_reports_about_itself_is_not_the_vehicle() {
     rig.expect_event("link restored");
 }
 
+/// The strength of the signal, its margin and the margin's trend over the last minute stand in the
+/// first line, while a radio reports them.
+#[test]
+fn the_first_line_has_the_margin_of_the_radio_and_its_trend() {
+    let radio = Address { system_id: 51, component_id: 68 };
+    let mut rig = Rig::crewed();
+    let first_line = |rig: &Rig| rig.screen(80, 24).lines().next().unwrap_or_default().to_owned();
+    assert!(!first_line(&rig).contains("dB"), "{}", first_line(&rig));
+    let report = |rig: &mut Rig, seconds: u32, rssi: u8| {
+        for _ in 0..seconds {
+            rig.run(1.0);
+            let status =
+                RADIO_STATUS_DATA { rssi, remrssi: 200, noise: 45, remnoise: 45, ..Default::default() };
+            rig.receive_from(radio, &MavMessage::RADIO_STATUS(status));
+        }
+    };
+    // RSSI = 1.9 (dBm + 127): 101 steps are -74 dBm, 56 steps over the noise 29 dB.
+    report(&mut rig, 3, 101);
+    assert!(first_line(&rig).contains(" -74 dBm +29 dB "), "{}", first_line(&rig));
+    assert!(rig.screen(140, 45).contains(" rssi -74 dBm margin 29 dB "), "{}", rig.screen(140, 45));
+    report(&mut rig, 80, 101);
+    assert!(first_line(&rig).contains("+29 dB→"), "{}", first_line(&rig));
+    report(&mut rig, 40, 91);
+    assert!(first_line(&rig).contains("+24 dB↓"), "{}", first_line(&rig));
+    report(&mut rig, 70, 91);
+    report(&mut rig, 20, 111);
+    assert!(first_line(&rig).contains("+35 dB↑"), "{}", first_line(&rig));
+    rig.run(6.0);
+    assert!(!first_line(&rig).contains("dB"), "no longer fresh: {}", first_line(&rig));
+}
+
 #[test]
 fn other_systems_change_nothing() {
     let mut rig = Rig::crewed();

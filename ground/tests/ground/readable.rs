@@ -55,7 +55,7 @@ fn in_every_state(rig: &mut Rig, kind: CommandKind, mut see: impl FnMut(&str, &R
     let is_ours = |rig: &Rig| {
         rig.model.commands.tracks.iter().position(|track| track.kind == kind).expect("it was commanded")
     };
-    for state in [A::Waiting, A::InProgress, A::AwaitsConfirmation, A::GivenUp]
+    for state in [A::Waiting, A::InProgress, A::Proposed, A::GivenUp]
         .into_iter()
         .chain([0, 1, 3, 5, 9].map(A::Answered))
     {

@@ -140,6 +140,18 @@ fn a_position_shows_the_same_screen_however_it_was_reached() {
     assert!(screen(&straight).contains("REPLAY plays 43.0 of 60.0 s"));
 }
 
+/// From the beginning on: the recording ends 32 s after the start of the flight.
+#[test]
+fn the_recorded_flight_fills_the_axis_of_time() {
+    let mut player = player();
+    for second in [22, 25, 38] {
+        player.seek(S(second));
+        let screen = drawn(&player).backend().to_string();
+        let axis = screen.lines().find(|line| line.contains("T+ s")).expect("the axis");
+        assert!(axis.contains("30") && !axis.contains("40"), "{second}: {screen}");
+    }
+}
+
 #[test]
 fn no_key_commands_anything_in_a_replay() {
     let mut player = player();

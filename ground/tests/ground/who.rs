@@ -170,12 +170,12 @@ fn a_second_vehicle_does_not_hide_a_countdown_and_the_station_that_armed_holds_i
 #[test]
 fn messages_of_a_spare_before_its_first_status_are_not_shown_as_the_vehicles() {
     let mut rig = counting();
-    rig.msg(Msg::ReceivedFrom(1));
+    rig.msg(Msg::FromSource(1));
     rig.run(1.0);
-    rig.msg(Msg::ReceivedFrom(2));
+    rig.msg(Msg::FromSource(2));
     rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [7; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission(), None);
-    rig.msg(Msg::ReceivedFrom(1));
+    rig.msg(Msg::FromSource(1));
     rig.receive(&MavMessage::TD_MISSION(TD_MISSION_DATA { hash: [8; 8], ..TD_MISSION_DATA::default() }));
     assert_eq!(rig.model.vehicle.mission().as_ref().map(|mission| mission.hash.0), Some([8; 8]));
 }

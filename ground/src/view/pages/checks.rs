@@ -10,12 +10,14 @@ use ratatui::layout::Rect;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap, canvas};
 
-use super::{Room, columns, flight, framed, rows};
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
     Way, dead_reckoning::may_have_left, shown, standing, words,
 };
+use crate::view::band::Room;
 use crate::view::pictures::{Plane, qr};
+use crate::view::shared::{FROM_ABOVE, map};
+use crate::view::widgets::{columns, framed, rows};
 use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, seconds};
 
 /// Columns of one value beside others.
@@ -46,36 +48,32 @@ pub fn checks_lines(model: &Model, theme: Theme, now: Duration, columns: usize) 
 /// The running check, or its outcome, and the keys.
 fn headline(model: &Model, check: Option<&PadCheck>, theme: Theme, now: Duration) -> Line<'static> {
     use TdPadCheckState as S;
-    let [all, still] = [Act::Check, Act::CheckStill].map(Act::key_name);
+    let [all, still, seen] = [Act::Check, Act::CheckStill, Act::Seen].map(Act::key_name);
     let begin = format!("  {all} checks (MOVES), {still} without motion");
+    let end = format!("  {all} ends it");
     if standing(model, now) == Standing::MayRun {
         return Line::from(vec![
             theme.span(" A CHECK MAY RUN: hands off", TextRole::Caution),
-            theme.label(format!("  {all} ends it")),
+            theme.label(end),
         ]);
     }
     let Some(check) = check.filter(|check| check.report.state != S::TD_PAD_CHECK_STATE_NOT_RUN) else {
         return Line::from(vec![theme.plain(" no check yet"), theme.label(begin)]);
     };
-    let failing = check.failing().count();
+    let (run, failing) = (check.report.run, check.failing().count());
     let (words, role, then) = match check.report.state {
-        S::TD_PAD_CHECK_STATE_RUNNING => (
-            format!(" CHECK {} RUNS {} %: hands off", check.report.run, check.report.progress),
-            TextRole::Caution,
-            format!("  {all} ends it"),
-        ),
-        S::TD_PAD_CHECK_STATE_PASSED if check.awaits_eyes() => (
-            format!(" CHECK {} PASSED but for what only people see", check.report.run),
-            TextRole::Caution,
-            format!("  {} confirms it", Act::Seen.key_name()),
-        ),
-        S::TD_PAD_CHECK_STATE_PASSED => {
-            (format!(" CHECK {} PASSED", check.report.run), TextRole::Good, begin)
+        S::TD_PAD_CHECK_STATE_RUNNING => {
+            (format!(" CHECK {run} RUNS {} %: hands off", check.report.progress), TextRole::Caution, end)
         }
+        S::TD_PAD_CHECK_STATE_PASSED if check.awaits_eyes() => {
+            let words = format!(" CHECK {run} PASSED but for what only people see");
+            (words, TextRole::Caution, format!("  {seen} confirms it"))
+        }
+        S::TD_PAD_CHECK_STATE_PASSED => (format!(" CHECK {run} PASSED"), TextRole::Good, begin),
         S::TD_PAD_CHECK_STATE_FAILED => {
-            (format!(" CHECK {} FAILED: {failing} outside", check.report.run), TextRole::Alarm, begin)
+            (format!(" CHECK {run} FAILED: {failing} outside"), TextRole::Alarm, begin)
         }
-        _ => (format!(" CHECK {} STOPPED early", check.report.run), TextRole::Caution, begin),
+        _ => (format!(" CHECK {run} STOPPED early"), TextRole::Caution, begin),
     };
     let report = seconds(now.saturating_sub(check.reported_at));
     let by = Some(check.report.asked_by).filter(|number| *number > 0);
@@ -92,14 +90,8 @@ pub fn supply(model: &Model, theme: Theme) -> Line<'static> {
     });
     let free = |space: Sample<f64>| format!("{} MiB free", fixed(space.value, 0));
     let space = model.vehicle.log_space_mib().map_or_else(not_reported, free);
-    let [battery, space] = [battery, space].map(|words| theme.plain(words));
-    Line::from(vec![
-        theme.label(" battery "),
-        battery,
-        theme.label("   vehicle's log "),
-        space,
-        theme.label(" "),
-    ])
+    let [volts, mib] = [battery, space].map(|words| theme.plain(words));
+    Line::from(vec![theme.label(" battery "), volts, theme.label("   vehicle's log "), mib, theme.label(" ")])
 }
 
 fn role_of(verdict: TdPadCheckVerdict) -> (&'static str, TextRole) {
@@ -180,8 +172,7 @@ fn radio(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
         let (mark, role) = if is_met { ("ok", TextRole::Good) } else { ("NO", TextRole::Alarm) };
         theme.span(format!(" {mark} {words}"), role)
     };
-    let loss =
-        |name: &str, loss: f64| judged(loss <= LOSS_MOST, format!("{name} {} %", fixed(100.0 * loss, 1)));
+    let loss = |of: &str, loss: f64| judged(loss <= LOSS_MOST, format!("{of} {} %", fixed(100.0 * loss, 1)));
     let mut spans = vec![theme.span(format!(" RADIO {words}"), role)];
     spans.extend([loss("lost down", found.loss_down), loss("up", found.loss_up)]);
     spans.push(theme.label(format!(" most {:.0}", 100.0 * LOSS_MOST)));
@@ -222,14 +213,19 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     }
     let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
-    let code = at.map_or_else(Vec::new, |at| qr::code(at, right.height));
+    let of = |rows| at.map_or_else(Vec::new, |at| qr::code(at, rows));
+    // Beside large words a small screen has no rows for a border.
+    let bordered = of(right.height.saturating_sub(2));
+    let has_border = !bordered.is_empty();
+    let code = if has_border { bordered } else { of(right.height) };
     // A phone shows the way better than a map of 30 columns.
-    let code_columns = if code.is_empty() { 0 } else { qr::COLUMNS };
+    let code_columns = if code.is_empty() { 0 } else { qr::COLUMNS + 2 * u16::from(has_border) };
     let [over_ground, beside] = columns(right, [Fill(1), Length(code_columns)]);
     if over_ground.width > code_columns / 2 {
-        flight::map(flight::FROM_ABOVE, model, theme, now, frame, over_ground);
+        map(FROM_ABOVE, model, theme, now, frame, over_ground);
     }
-    draw_lines(frame, beside, &code);
+    let inside = if has_border { framed("phone", Line::default(), theme, frame, beside) } else { beside };
+    draw_lines(frame, inside, &code);
 }
 
 /// An arrow has the same shape wherever it points.

@@ -6,15 +6,15 @@ use std::time::Duration;
 use protocol::dialect::{TD_CONTROLLER_DATA, TD_DESCENT_DATA, TdAbortEffect, TdBooster, TdChute, TdPhase};
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
-use ratatui::layout::{Layout, Rect, Spacing};
+use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{Room, columns, events, framed, rows, table};
 use crate::model::{Deflection, Model, Page, Sample, dead_reckoning::is_silent, quantity::Quantity, words};
-use crate::view::band::draw_band;
-use crate::view::pictures::attitude::{Side, draw_attitude};
-use crate::view::pictures::height::draw_height;
-use crate::view::pictures::map::{comes_down, draw_map};
+use crate::view::band::{Room, draw_band};
+use crate::view::pictures::attitude::Side;
+use crate::view::pictures::map::comes_down;
+use crate::view::shared::{FROM_ABOVE, events, height, map, vehicle};
+use crate::view::widgets::{columns, framed, rows, table};
 use crate::view::{
     TextRole, Theme, age_mark, bars, draw_lines, fixed, headline, panels, quantity_row, status_lines,
     text_row,
@@ -24,9 +24,6 @@ use crate::view::{
 const SIDE_COLUMNS: u16 = 18;
 /// The same for its predicted position.
 const LOST_COLUMNS: u16 = 28;
-pub const FROM_ABOVE: &str = "from above";
-/// From this width on a title has a legend beside it.
-const LEGEND_COLUMNS: u16 = 34;
 /// Columns and rows of the six limits with their borders.
 const LIMIT_COLUMNS: u16 = 32;
 pub const LIMIT_ROWS: u16 = 8;
@@ -38,9 +35,7 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     // The newest state in words, under the number.
     let descent = model.vehicle.descent();
     let below = match model.page() {
-        Page::Ascent => {
-            state("booster", descent.as_ref().map(|report| report.clone().map(booster)), theme, now)
-        }
+        Page::Ascent => state("booster", descent.clone().map(|report| report.map(booster)), theme, now),
         Page::Landing => {
             let report = model.vehicle.last::<TD_CONTROLLER_DATA>();
             state("burn", report.map(|report| report.map(|report| panels::steered(report.level))), theme, now)
@@ -95,31 +90,6 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     area
 }
 
-/// A panel with the height over time.
-pub fn height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let legend = bars::legend([" ━", " flown "], ["┄", " predicted "], theme);
-    let legend = if area.width < LEGEND_COLUMNS { Line::default() } else { legend };
-    let inside = framed("height m", legend, theme, frame, area);
-    draw_height(model, theme, now, frame, inside);
-}
-
-/// A panel with the place from above.
-pub fn map(title: &str, model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    let inside = framed(title, Line::default(), theme, frame, area);
-    draw_map(model, theme, now, frame, inside);
-}
-
-/// The vehicle from each of these sides; after the loss of the link its predicted position instead.
-pub fn vehicle(model: &Model, sides: &[Side], theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
-    if is_silent(&model.vehicle, now) {
-        return table("PREDICTED", &panels::lost_rows(model, theme, now), theme, frame, area);
-    }
-    let beside = Layout::horizontal(sides.iter().map(|_| Fill(1))).spacing(Spacing::Overlap(1));
-    for (side, at) in sides.iter().zip(&*beside.split(area)) {
-        draw_attitude(model, *side, theme, now, frame, *at);
-    }
-}
-
 /// The values beside the state of the parachute, the most important first.
 static VALUES: [&str; 7] =
     ["tilt", "horizontal speed", "distance", "touchdown north", "touchdown east", "wind", "drag"];
@@ -134,7 +104,6 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
     let vehicle = &model.vehicle;
     let descent = vehicle.descent()?;
     let d = &descent.value;
-    let (mark, age) = age_mark(&descent, now);
     let height_m = vehicle.height_m()?.value;
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
     let off_m = comes_down(model, now).map_or(f64::NAN, |at| libm::hypot(at.east_m, at.north_m));
@@ -165,8 +134,7 @@ fn gate(model: &Model, theme: Theme, now: Duration) -> Option<(Line<'static>, Ve
     let title = theme.line(format!(" {open} of {} met ", rows.len()), role(open == rows.len()));
     let lines = rows.into_iter().map(|(name, holds, text, unit)| {
         let label = format!("{:<5}{name}", if holds { "ok" } else { "wait" });
-        let role = if age == TextRole::Stale { age } else { role(holds) };
-        text_row(theme, &label, (mark, role), &text, &unit)
+        text_row(theme, &label, age_mark(&descent, now, role(holds)), &text, &unit)
     });
     let others = values(model, theme, now, &["tilt", "turn rate"]);
     Some((title, lines.chain(others).collect()))
@@ -178,15 +146,10 @@ fn values(model: &Model, theme: Theme, now: Duration, names: &[&str]) -> Vec<Lin
 }
 
 /// A state of the newest report, in words.
-fn state(
-    label: &str,
-    report: Option<Sample<(String, TextRole)>>,
-    theme: Theme,
-    now: Duration,
-) -> Line<'static> {
-    let Some(report) = report else { return text_row(theme, label, (" ", TextRole::Label), "no data", "") };
-    let ((mark, age), (text, role)) = (age_mark(&report, now), &report.value);
-    text_row(theme, label, (mark, if age == TextRole::Stale { age } else { *role }), text, "")
+fn state(label: &str, of: Option<Sample<(String, TextRole)>>, theme: Theme, now: Duration) -> Line<'static> {
+    let Some(report) = of else { return text_row(theme, label, (" ", TextRole::Label), "no data", "") };
+    let (text, role) = &report.value;
+    text_row(theme, label, age_mark(&report, now, *role), text, "")
 }
 
 fn booster(descent: &TD_DESCENT_DATA) -> (String, TextRole) {
@@ -216,7 +179,6 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     let Some(descent) = model.vehicle.descent().filter(|_| model.vehicle.in_flight()) else {
         return theme.line(" band --", TextRole::Label);
     };
-    let (mark, stale) = age_mark(&descent, now);
     let d = &descent.value;
     let height_m = model.vehicle.height_m().map_or(f64::NAN, |height| height.value);
     let (low_m, high_m) = (f64::from(d.band_low_m), f64::from(d.band_high_m));
@@ -230,7 +192,7 @@ fn band_word(model: &Model, theme: Theme, now: Duration) -> Line<'static> {
     };
     let committed = height_m < f64::from(d.commit_height_m) && !parachute_may_fly(model, d.chute);
     let commit = if committed { ", committed" } else { "" };
-    let role = if stale == TextRole::Stale { stale } else { role };
+    let (mark, role) = age_mark(&descent, now, role);
     theme.line(format!("{mark}{words}{commit}"), role)
 }
 
@@ -240,5 +202,5 @@ fn parachute_may_fly(model: &Model, chute: TdChute) -> bool {
     let out = matches!(chute, TdChute::TD_CHUTE_FIRED | TdChute::TD_CHUTE_OPEN);
     let ordered = model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
     let now = TdAbortEffect::TD_ABORT_EFFECT_CHUTE_NOW;
-    out || ordered || model.vehicle.status.as_ref().is_some_and(|status| status.value.abort_effect == now)
+    out || ordered || model.vehicle.reports(|status| status.abort_effect == now)
 }

@@ -9,7 +9,7 @@ use protocol::link_stats::{LinkFigures, MessageFigures, SourceFigures};
 use protocol::signing::SigningCounters;
 use ratatui::text::{Line, Span};
 
-use crate::model::{LinkReport, Model, RADIO_FRESH, STALE_AFTER, refusal};
+use crate::model::{LinkReport, Model, STALE_AFTER, refusal};
 use crate::view::status_lines::{loss_role, percent};
 use crate::view::{STALE_MARK, TextRole, Theme, fixed, seconds};
 
@@ -61,8 +61,7 @@ fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         let since = seconds(now.saturating_sub(refused.at));
         format!("{} of {system_id}/{component_id} by the vehicle, {since} ago: {why}", refused.count)
     });
-    let radio = model.link.radio.as_ref().filter(|(_, at)| now.saturating_sub(*at) < RADIO_FRESH);
-    let radio = radio.map(|(radio, _)| {
+    let radio = model.link.radio(now).map(|radio| {
         let known = |value: u8| if value == u8::MAX { "--".to_owned() } else { value.to_string() };
         let [rssi, remote, noise, far] = [radio.rssi, radio.remrssi, radio.noise, radio.remnoise].map(known);
         format!("rssi {rssi}/{remote} noise {noise}/{far}")
@@ -73,10 +72,7 @@ fn rejected(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         ("unsent", (drops > 0).then(|| format!("{drops} writes found no room"))),
         ("refused", refused),
         ("radio", radio),
-        (
-            "answers",
-            model.link.round_trip.map(|trip| format!("round trip {:.0} ms", 1e3 * trip.as_secs_f64())),
-        ),
+        ("answers", model.link.round_trip.map(|of| format!("round trip {:.0} ms", 1e3 * of.as_secs_f64()))),
     ];
     let known = rows.into_iter().filter_map(|(label, value)| Some((label, value?)));
     known
@@ -146,15 +142,13 @@ fn message_lines(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     (0..rows)
         .map(|row| {
             let cells = (0..across).filter_map(|column| messages.get(row + column * rows));
-            Line::from(
-                cells.flat_map(|(name, received)| message_cell(name, *received, theme)).collect::<Vec<_>>(),
-            )
+            Line::from(cells.flat_map(|(name, at)| message_cell(name, *at, theme)).collect::<Vec<_>>())
         })
         .collect()
 }
 
-fn message_cell(name: &str, received: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
-    let (text, role) = match received {
+fn message_cell(name: &str, at: Option<MessageFigures>, theme: Theme) -> [Span<'static>; 2] {
+    let (text, role) = match at {
         None => ("  never".to_owned(), TextRole::Label),
         Some(MessageFigures { age, rx_frames_s, .. }) => {
             let (mark, role) =
@@ -172,7 +166,7 @@ fn messages(model: &Model, now: Duration) -> Vec<(&'static str, Option<MessageFi
         let name = message_name(figures.message_id).filter(|_| figures.source == model.settings.vehicle);
         let Some(name) = name else { continue };
         match messages.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, received)) => *received = Some(figures),
+            Some((_, at)) => *at = Some(figures),
             None => messages.push((name, Some(figures))),
         }
     }

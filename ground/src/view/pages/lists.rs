@@ -12,13 +12,7 @@ use crate::view::{TextRole, Theme, lists, seconds};
 const WORD_COLUMNS: usize = 13;
 
 /// The keys, then one alarm per line, the oldest first. The one that Space acknowledges is marked.
-pub fn alarms_lines(
-    model: &Model,
-    theme: Theme,
-    now: Duration,
-    columns: usize,
-    rows: usize,
-) -> Vec<Line<'static>> {
+pub fn alarms(model: &Model, theme: Theme, now: Duration, columns: usize, rows: usize) -> Vec<Line<'static>> {
     let list = model.alarms.list();
     if list.is_empty() {
         return vec![theme.line(" no active or unacknowledged alarm", TextRole::Plain)];

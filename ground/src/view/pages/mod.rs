@@ -12,16 +12,15 @@ use std::time::Duration;
 
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length, Percentage};
-use ratatui::layout::{Constraint, Layout, Margin, Rect, Spacing};
-use ratatui::symbols::merge::MergeStrategy;
+use ratatui::layout::{Margin, Rect};
 use ratatui::text::Line;
-use ratatui::widgets::Block;
 
 use super::band::Room;
-use super::footer::flight_began;
 use super::pictures::attitude::Side;
-use super::{TextRole, Theme, bars, draw_lines};
-use crate::model::{Model, Page};
+use super::shared::{FROM_ABOVE, events, height, map, vehicle};
+use super::widgets::{columns, framed, rows};
+use super::{Theme, bars, draw_lines};
+use crate::model::{Model, Page, flight_began};
 
 /// Draws the present page between the top lines and the alarm line. Returns where the pictures of a
 /// flight are.
@@ -52,22 +51,21 @@ const EVENTS_ROWS: u16 = 5;
 fn draw_list(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) -> Option<Rect> {
     let page = model.page();
     let has_pictures = Room::of(frame.area()) != Room::Small;
-    let share =
-        if matches!(page, Page::Link | Page::Checks) { Length(TABLE_COLUMNS) } else { Percentage(60) };
-    let [area, right] = columns(area, if has_pictures { [share, Fill(1)] } else { [Fill(1), Length(1)] });
+    let part = if matches!(page, Page::Link | Page::Checks) { Length(TABLE_COLUMNS) } else { Percentage(60) };
+    let [area, right] = columns(area, if has_pictures { [part, Fill(1)] } else { [Fill(1), Length(1)] });
     if has_pictures {
         // A check moves fins and gimbal, and on the pad there is no flight to show.
         let is_check = page == Page::Checks;
         let [above, below] = rows(right, [Fill(1), if is_check { Length(BARS_ROWS) } else { Fill(1) }]);
         if is_check || flight_began(model).is_none() {
-            flight::vehicle(model, &[Side::South, Side::East], theme, now, frame, above);
+            vehicle(model, &[Side::South, Side::East], theme, now, frame, above);
         } else {
-            flight::height(model, theme, now, frame, above);
+            height(model, theme, now, frame, above);
         }
         if is_check {
             bars::draw_surfaces(model, theme, now, frame, below);
         } else {
-            flight::map(flight::FROM_ABOVE, model, theme, now, frame, below);
+            map(FROM_ABOVE, model, theme, now, frame, below);
         }
     }
     let lines = lines(model, theme, now, area.inner(Margin::new(1, 1)));
@@ -92,46 +90,10 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
         Page::Log => lists::log_lines(model, theme, now),
-        Page::Alarms => lists::alarms_lines(model, theme, now, columns, rows),
+        Page::Alarms => lists::alarms(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),
         Page::Help => lists::help_lines(model, theme, now, columns),
         _ => super::lists::events(model, theme, columns, rows),
     }
-}
-
-/// Splits an area into panels beside each other, which share a border.
-fn columns<const N: usize>(area: Rect, columns: [Constraint; N]) -> [Rect; N] {
-    area.layout(&Layout::horizontal(columns).spacing(Spacing::Overlap(1)))
-}
-
-/// Splits an area into panels above each other, which share a border.
-fn rows<const N: usize>(area: Rect, rows: [Constraint; N]) -> [Rect; N] {
-    area.layout(&Layout::vertical(rows).spacing(Spacing::Overlap(1)))
-}
-
-/// Draws the border of a panel with its title, and what stands at the right end of it. Returns its
-/// inside.
-pub fn framed(title: &str, right: Line<'static>, theme: Theme, frame: &mut Frame, area: Rect) -> Rect {
-    let title = theme.line(format!(" {title} "), TextRole::Title);
-    let block = Block::bordered().border_style(theme.border()).merge_borders(MergeStrategy::Exact);
-    let block = block.title(title);
-    let block = if right.width() == 0 { block } else { block.title(right.right_aligned()) };
-    let inside = block.inner(area);
-    frame.render_widget(block, area.intersection(frame.area()));
-    inside
-}
-
-/// A panel with the newest events.
-fn events(model: &Model, theme: Theme, frame: &mut Frame, area: Rect) {
-    let inside = framed("events", Line::default(), theme, frame, area);
-    let lines = super::lists::events(model, theme, usize::from(inside.width), usize::from(inside.height));
-    draw_lines(frame, inside, &lines);
-}
-
-/// A panel with lines.
-fn table(title: &str, lines: &[Line], theme: Theme, frame: &mut Frame, area: Rect) {
-    let inside = framed(title, Line::default(), theme, frame, area);
-    // The most important first; the rest is on the page of all values.
-    draw_lines(frame, inside, &lines[..lines.len().min(usize::from(inside.height))]);
 }

@@ -9,14 +9,14 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::flight::map;
-use super::{Room, columns, events, framed, rows, table};
 use crate::model::{
     Act, Deflection, LogStanding, Model, SENSORS, Vehicle, hold_words, is_on_pad, link_hints, why_not_here,
     why_untested, words,
 };
-use crate::view::band::{Item, draw_band, word};
+use crate::view::band::{Item, Room, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
+use crate::view::shared::{events, map};
+use crate::view::widgets::{columns, framed, rows, table};
 use crate::view::{STALE_MARK, TextRole, Theme, draw_lines, fixed, headline, lists, top_lines};
 
 /// Columns of the checks.
@@ -41,7 +41,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         if model.checklist.is_some() && model.pages.checklist {
             draw_checklist(model, theme, now, frame, right);
         } else if is_amiss {
-            let lines = checks(model, theme, now);
+            let lines = checks(model, theme, now, false);
             let wanted = lines.len() as u16 + 2;
             // One row of events would cut the newest one.
             let wanted = if right.height < wanted + 4 { right.height } else { wanted };
@@ -57,17 +57,22 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         }
         return;
     }
+    // A large screen lists every check under the steps, where a smaller one has no room.
+    let is_large = Room::of(frame.area()) == Room::Large;
     let [above, below] = rows(area, [Fill(1), Length(BELOW_ROWS)]);
-    let [left, south, east, right] =
-        columns(above, [Length(STEP_COLUMNS[1]), Percentage(17), Percentage(17), Fill(1)]);
+    let steps = if is_large { CHECK_COLUMNS } else { STEP_COLUMNS[1] };
+    let [left, south, east, right] = columns(above, [Length(steps), Percentage(17), Percentage(17), Fill(1)]);
+    let listed = [Length(if is_large { ladder.len() as u16 + 2 } else { left.height }), Fill(1)];
+    let [left, checks_at] = rows(left, listed);
     table("steps", &ladder, theme, frame, left);
     draw_attitude(model, Side::South, theme, now, frame, south);
     draw_attitude(model, Side::East, theme, now, frame, east);
     map("around the pad", model, theme, now, frame, right);
     let list = if model.checklist.is_some() { Percentage(40) } else { Length(1) };
-    let [left, middle, right] = columns(below, [Length(CHECK_COLUMNS + 4), list, Fill(1)]);
-    let lines = checks(model, theme, now);
-    table("checks", &lines, theme, frame, left);
+    let beside = Length(if is_large { 1 } else { CHECK_COLUMNS + 4 });
+    let [left, middle, right] = columns(below, [beside, list, Fill(1)]);
+    let checks_at = if is_large { checks_at } else { left };
+    table("checks", &checks(model, theme, now, is_large), theme, frame, checks_at);
     if model.checklist.is_some() {
         draw_checklist(model, theme, now, frame, middle);
     }
@@ -117,8 +122,8 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
 }
 
 /// Each failing check in the words of the vehicle, or with the value found and why it fails; how
-/// many pass; the measured values of those.
-pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+/// many pass; `all` of those, or those with a measured value.
+pub fn checks(model: &Model, theme: Theme, now: Duration, all: bool) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
@@ -137,7 +142,7 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
         Line::from(vec![theme.span(word, role), value, theme.span(reason, TextRole::Caution)])
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
-    let all = model.vehicle.checks_made();
+    let made = model.vehicle.checks_made();
     let (station_log_fails, station_log) = station_log(model, theme, now);
     let several = model.vehicle_rows(now).into_iter();
     let several = several.map(|words| theme.line(format!(" {words}"), TextRole::Alarm));
@@ -156,11 +161,11 @@ pub fn checks(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> 
         ]),
         _ => row(" NO ", check, about(&model.vehicle, check.1).1),
     }));
-    let of = all.iter().count();
+    let of = made.iter().count();
     let count = format!(" GO {mark}{} of {of} checks", of - failed.iter().count());
     lines.push(theme.line(count, TextRole::Good));
-    let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && found(*bit).contains(' ');
-    lines.extend(all.iter_names().filter(measured).map(|check| row("    ", check, "")));
+    let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && (all || found(*bit).contains(' '));
+    lines.extend(made.iter_names().filter(measured).map(|check| row("    ", check, "")));
     if !station_log_fails {
         lines.push(station_log);
     }
@@ -244,18 +249,15 @@ fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
         TdCheck::TD_CHECK_SELF_TEST => unseen("not passed"),
         TdCheck::TD_CHECK_GNSS => unseen("no fix"),
         sensor if SENSORS.contains(sensor) => unseen("no data"),
-        TdCheck::TD_CHECK_TILT => {
-            (number(attitude.map(|a| a.tilt_rad.to_degrees()), 1, "deg"), "not upright")
-        }
+        TdCheck::TD_CHECK_TILT => (number(vehicle.tilt_deg().map(|a| a.value), 1, "deg"), "not upright"),
         TdCheck::TD_CHECK_ROTATION => {
             (number(attitude.map(|a| a.turn_rate_rad_s().to_degrees()), 1, "deg/s"), "turning")
         }
         TdCheck::TD_CHECK_SPEED => (number(vehicle.motion.map(|m| m.value.speed_m_s()), 2, "m/s"), "moving"),
         TdCheck::TD_CHECK_ESTIMATOR => unseen("not settled"),
         TdCheck::TD_CHECK_FINS => {
-            let error =
-                vehicle.fins().map(|fins| fins.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
-            (number(error, 1, "deg"), "no answer")
+            let off = vehicle.fins().map(|of| of.value.iter().map(Deflection::error_deg).fold(0.0, f64::max));
+            (number(off, 1, "deg"), "no answer")
         }
         TdCheck::TD_CHECK_IGNITER => unseen("open circuit"),
         TdCheck::TD_CHECK_LOG => unseen("not running"),
@@ -263,9 +265,8 @@ fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
             (number(vehicle.log_space_mib().map(|space| space.value), 0, "MiB"), "disk full")
         }
         TdCheck::TD_CHECK_CONTROLLER_WARM => {
-            let status =
-                vehicle.last::<TD_CONTROLLER_DATA>().map(|controller| controller.value.solver_status);
-            let words = status.map(|status| words::lower_case(&status, "TD_SOLVER_STATUS_"));
+            let controller = vehicle.last::<TD_CONTROLLER_DATA>().map(|controller| controller.value);
+            let words = controller.map(|of| words::lower_case(&of.solver_status, "TD_SOLVER_STATUS_"));
             (words.unwrap_or_default().chars().take(10).collect(), "no rehearsal")
         }
         TdCheck::TD_CHECK_PREDICTED_TOUCHDOWN => {
@@ -287,8 +288,7 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let phase = vehicle.phase_now();
     let armed = vehicle.is_armed();
     let on_pad = phase.is_some_and(is_on_pad);
-    let checked =
-        on_pad && vehicle.status.as_ref().is_some_and(|status| status.value.checks_failed.is_empty());
+    let checked = on_pad && vehicle.reports(|status| status.checks_failed.is_empty());
     let pin_out = vehicle.shows(TdInterlock::TD_INTERLOCK_PIN_OUT);
     let counting = vehicle.countdown_s().is_some();
     let two = model.people() == Some(2);
@@ -327,15 +327,18 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
         theme.line(format!("   {} {:.8}", mission.in_words(), mission.hash.to_string()), TextRole::Plain)
     }));
     if let Some(number) = model.commanded_by() {
-        let here = number == model.operator_number();
+        let here = number == model.seat_key();
         let words = format!(" {} commands{}", model.operator(number), if here { " (you)" } else { "" });
         lines.push(theme.line(words, TextRole::Plain));
     }
     let watches = model.settings.role.why_not_command();
     let only_stops = why_not_here(model).map(|_| "only HOLD and ABORT here");
     let why = watches.or(only_stops).unwrap_or_default();
-    let wrapped =
-        lists::wrap(why, usize::from(STEP_COLUMNS[0]) - 3).into_iter().filter(|words| !words.is_empty());
-    lines.extend(wrapped.map(|words| theme.line(format!(" {words}"), TextRole::Label)));
+    let wrapped = lists::wrap(why, usize::from(STEP_COLUMNS[0]) - 3).into_iter();
+    lines.extend(
+        wrapped
+            .filter(|words| !words.is_empty())
+            .map(|words| theme.line(format!(" {words}"), TextRole::Label)),
+    );
     lines
 }

@@ -7,20 +7,16 @@ use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::{columns, framed};
-use crate::model::{
-    Model,
-    quantity::{ALL, Quantity},
-};
-use crate::view::footer::flight_began;
-use crate::view::pictures::{scales, seconds_since, ticks};
+use crate::model::quantity::{ALL, Quantity};
+use crate::model::{Model, flight_began};
+use crate::view::pictures::{scales, seconds_since};
+use crate::view::widgets::{columns, framed};
 use crate::view::{Ink, TextRole, Theme, draw_line, draw_lines, fixed, quantity_row};
 
 /// Columns of the list of quantities.
 const LIST_COLUMNS: u16 = 36;
 /// Columns and rows from one tick to the next, at least.
-const TICK_COLUMNS: u16 = 9;
-const TICK_ROWS: u16 = 3;
+const TICKS_APART: [u16; 2] = [9, 3];
 /// Without a flight this much of the past is shown; in flight all of it, and this much before.
 const CALM_SPAN: Duration = Duration::from_mins(2);
 const BEFORE_FLIGHT: Duration = Duration::from_secs(5);
@@ -51,11 +47,11 @@ pub fn draw_plot_page(model: &Model, theme: Theme, now: Duration, frame: &mut Fr
     // A little room around the line, and for a value that does not change that of its last digit.
     let margin = ((most - least) / 20.0).max(libm::exp10(-(quantity.decimals as f64)));
     let up = [least - margin, most + margin];
-    let marks = (&*ticks(across, inside.width / TICK_COLUMNS), &*ticks(up, inside.height / TICK_ROWS));
     let unit = if first.is_some() { "T+ s" } else { "s" };
-    let plane = scales((across, up), marks, unit, theme, frame, inside);
+    let plane = scales((across, up), TICKS_APART, unit, theme, frame, inside);
     plane.draw(theme, frame, |context| plane.measured(context, &points, theme.ink(Ink::Measured)));
 }
+
 /// The quantities around the chosen one, which is marked, each with its present value.
 fn values(model: &Model, theme: Theme, now: Duration, rows: usize) -> Vec<Line<'static>> {
     let chosen = model.pages.plotted;

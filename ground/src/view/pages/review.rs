@@ -8,10 +8,11 @@ use ratatui::layout::Constraint::{Fill, Length, Percentage};
 use ratatui::layout::Rect;
 use ratatui::text::Line;
 
-use super::flight::{FROM_ABOVE, LIMIT_ROWS, height, map};
-use super::{Room, columns, events, rows, table};
+use super::flight::LIMIT_ROWS;
 use crate::model::{Act, Model, RED_AFTER};
-use crate::view::band::draw_band;
+use crate::view::band::{Room, draw_band};
+use crate::view::shared::{FROM_ABOVE, events, height, map};
+use crate::view::widgets::{columns, rows, table};
 use crate::view::{TextRole, Theme, bars, fixed, headline, lists, panels};
 
 /// Columns of the time before a finding.

@@ -12,7 +12,7 @@ use ratatui::widgets::canvas::{self, Context};
 
 use super::{DOTS_ACROSS, DOTS_UP, Ink, Plane, TextRole, Theme};
 use crate::model::{Attitude, Change, GRAVITY_M_S2, Gimbal, Model, NorthEastUp, Vehicle};
-use crate::view::{draw_line, fixed, pages::framed};
+use crate::view::{draw_line, fixed, widgets::framed};
 
 /// From where the vehicle is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,8 +107,7 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
     };
     let burning = gives_thrust(vehicle);
     let gimbal = vehicle.gimbal().map_or_else(Gimbal::default, |gimbal| gimbal.value);
-    let limit_rad =
-        vehicle.limits().map(|limits| f64::from(limits.tilt_rad)).filter(|limit| *limit < ARC_REACH);
+    let limit_rad = vehicle.limits().map(|of| f64::from(of.tilt_rad)).filter(|rad| *rad < ARC_REACH);
     let near_ground = vehicle.height_m().is_some_and(|height| height.value < 2.0);
     let chute = vehicle.descent().map(|descent| descent.value.chute).filter(|_| vehicle.in_flight());
     plane.draw(theme, frame, |context| {
@@ -159,8 +158,7 @@ pub fn draw_attitude(model: &Model, side: Side, theme: Theme, now: Duration, fra
             let y = LEG[1] - per_dot;
             context.draw(&canvas::Line::new(-half[0], y, half[0], y, theme.ink(Ink::Scale)));
         }
-        let motion =
-            vehicle.best_motion().map(|motion| motion.value).filter(|motion| motion.speed_m_s() > 1.0);
+        let motion = vehicle.best_motion().map(|of| of.value).filter(|motion| motion.speed_m_s() > 1.0);
         if let Some(motion) = motion {
             let velocity = side.sees([motion.vx_m_s, motion.vy_m_s, motion.climb_m_s]);
             arrow(context, (0.72 * half[0], 0.1), velocity, theme.ink(Ink::Measured), per_dot);

@@ -7,21 +7,16 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Line;
 
-use super::{Ink, TextRole, Theme, scales, seconds_since, ticks};
-use crate::model::{
-    Model,
-    dead_reckoning::{predict_position, predicted_course},
-    is_burning,
-    quantity::Quantity,
-};
+use super::{Ink, TextRole, Theme, scales, seconds_since};
+use crate::model::dead_reckoning::{predict_position, predicted_course};
+use crate::model::{Model, flight_began, is_burning, quantity::Quantity};
 use crate::view::fixed;
-use crate::view::footer::{LENGTHS_S, flight_began, shown_until};
+use crate::view::footer::{LENGTHS_S, recorded, shown_until};
 
 /// The least height and time that the picture shows.
 const TOP_MIN_M: f64 = 10.0;
-/// Rows and columns from one tick to the next, at least.
-const TICK_ROWS: u16 = 3;
-const TICK_COLUMNS: u16 = 7;
+/// Columns and rows from one tick to the next, at least.
+const TICKS_APART: [u16; 2] = [7, 3];
 
 /// Draws height over time: flown, predicted to the touchdown, the ignition band, the planned
 /// ignition, and the height below which no parachute opens.
@@ -34,8 +29,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let until = shown_until(model, now);
     let present_s = seconds_since(until, from);
     let predicted_course = predicted_course(vehicle, now).into_iter();
-    let to_come: Vec<(f64, f64)> =
-        predicted_course.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
+    let to_come: Vec<_> = predicted_course.map(|(at, [.., up_m])| (seconds_since(at, from), up_m)).collect();
     let known = |height: Option<f64>| height.filter(|height_m| height_m.is_finite() && *height_m > 0.0);
     let of = |pick| known(vehicle.of_descent(pick).map(|sample| sample.value));
     let falls = matches!(
@@ -47,25 +41,24 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let band = of(|d| d.band_low_m).zip(of(|d| d.band_high_m)).filter(|_| lights);
     let commit_m = of(|d| d.commit_height_m).filter(|_| falls);
     let ignition = model.history.timeline.iter().find(|(phase, _)| *phase == TdPhase::TD_PHASE_POWERED);
-    let ignited_at_s = ignition.map(|(_, at)| seconds_since(*at, from));
+    let burn_s = ignition.map(|(_, at)| seconds_since(*at, from));
     // The burn fills the picture: the flight before it is irrelevant to its end.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
-    let ignited_s = ignited_at_s.map_or(present_s, |ignited_at_s| ignited_at_s.min(present_s));
+    let ignited_s = burn_s.map_or(present_s, |burn_s| burn_s.min(present_s));
     let begins_s = if burns { (ignited_s - 1.0).floor().max(0.0) } else { 0.0 };
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
     let flown: Vec<(f64, f64)> = flown.filter(|(at, _)| *at >= begins_s).collect();
     let reached = flown.iter().chain(&to_come).map(|(_, height_m)| *height_m).fold(TOP_MIN_M, f64::max);
-    let top =
-        [apogee_m, commit_m, band.map(|band| band.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
+    let top = [apogee_m, commit_m, band.map(|of| of.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
     let last_s = to_come.last().map_or(present_s, |(at, _)| *at).max(flown.last().map_or(0.0, |(at, _)| *at));
     // Of a flight that is over as long as it was.
     let length_s = LENGTHS_S.into_iter().find(|most_s| until == now && last_s < *most_s).unwrap_or(last_s);
+    let recorded_s = model.playing.as_ref().map(|playing| seconds_since(recorded(playing).1, from));
+    let length_s = recorded_s.filter(|s| *s >= last_s).unwrap_or(length_s);
     let length_s = if burns { last_s.ceil().max(begins_s + 4.0) } else { length_s };
-    let bounds = ([begins_s, length_s], [-0.02 * top, top]);
-    let across = ticks([begins_s, length_s], area.width / TICK_COLUMNS);
-    let plane =
-        scales(bounds, (&across, &ticks([0.0, top], area.height / TICK_ROWS)), "T+ s", theme, frame, area);
+    let bounds = ([begins_s, length_s], [0.0, top]);
+    let plane = scales(bounds, TICKS_APART, "T+ s", theme, frame, area);
     let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
     let highest = flown.iter().copied().reduce(|best, next| if next.1 > best.1 { next } else { best });
     // From the highest point on, so that neither they nor their names move.
@@ -92,14 +85,13 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     let (label, predicted) = (theme.style(TextRole::Label), ink(Ink::Predicted));
-    let ignited_at =
-        ignited_at_s.and_then(|ignited_at_s| flown.iter().copied().find(|(at, _)| *at >= ignited_at_s));
+    let burn_at = burn_s.and_then(|burn_s| flown.iter().copied().find(|(at, _)| *at >= burn_s));
     let lands_at = to_come.last().filter(|(_, height_m)| *height_m < 1.0).map(|(at, _)| (*at, 0.0));
     let here = height_m.map(|height_m| (present_s, height_m.value.max(0.0)));
     let lost_at = predict_position(vehicle, now).map(|at| (present_s, at.altitude_m));
     let marks = [
         (lost_at, "+", predicted),
-        (ignited_at, "▲", ink(Ink::Flame)),
+        (burn_at, "▲", ink(Ink::Flame)),
         (lands_at, "×", predicted),
         (lights_at, "▲", predicted),
         (here, "●", theme.style(TextRole::Title)),
@@ -123,7 +115,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         commit_m.map(|m| ((since_s, m), vec![format!("commit {}", whole(m))], ink(Ink::Limit))),
         apogee_m.filter(|_| rises).map(|m| ((since_s, m), vec![format!("apogee {}", whole(m))], predicted)),
         top.filter(|_| !rises).map(|at| (at, words("", at), label)),
-        ignited_at.map(|at| (at, words("ignition ", at), label)),
+        burn_at.map(|at| (at, words("ignition ", at), label)),
     ];
     for (at, words, style) in labels.into_iter().flatten() {
         plane.beside(frame, at, &words, style);

@@ -112,8 +112,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let burns = phase.is_some_and(is_burning);
     let here = vehicle.best_motion().filter(|motion| motion.value.x_m.is_finite() && !motion.is_stale(now));
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
-    let around =
-        |at: (f64, f64), radius: f64| [(at.0 - radius, at.1 - radius), (at.0 + radius, at.1 + radius)];
+    let around = |(x, y): (f64, f64), radius: f64| [(x - radius, y - radius), (x + radius, y + radius)];
     let on_pad = phase.is_some_and(is_on_pad);
     let crew = vehicle.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
     let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
@@ -143,8 +142,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     // A vehicle on its rail leans with it.
     let lean = vehicle.attitude.map(|attitude| attitude.value).filter(|_| on_pad);
     let rail = lean.filter(|attitude| attitude.tilt_rad.to_degrees() > RAIL_LEANS_DEG).map(|attitude| {
-        let [north, east, _] =
-            attitude.axes[0].map(|part| 0.4 * reach_m * part / libm::sin(attitude.tilt_rad));
+        let [north, east, _] = attitude.axes[0].map(|to| 0.4 * reach_m * to / libm::sin(attitude.tilt_rad));
         ((east, north), attitude.tilt_rad.to_degrees())
     });
     let error = lost.map(|at| circle((at.east_m, at.north_m), at.error_m));
@@ -201,20 +199,14 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
 }
 
 /// What stands at the edges: north, the wind, the fence, the scale.
-fn words(
-    model: &Model,
-    (fence_m, per_dot): (Option<f64>, f64),
-    theme: Theme,
-    frame: &mut Frame,
-    plane: &Plane,
-) {
+fn words(model: &Model, (fence_m, dot): (Option<f64>, f64), theme: Theme, frame: &mut Frame, plane: &Plane) {
     let label = theme.style(TextRole::Label);
     let ([left, right], [bottom, top]) = (plane.x, plane.y);
     plane.write(frame, (left, top), "N↑", label);
     let (wind, arrow) = (wind(model), "wind ");
     let wind = if plane.area.width < 24 { wind.trim_start_matches(arrow) } else { &wind };
     plane.write(frame, (right, top), wind, label);
-    let column = DOTS_ACROSS * per_dot;
+    let column = DOTS_ACROSS * dot;
     let length_m = widgets::tick_step((right - left) / 5.0, 1);
     let cells = (length_m / column).round().max(2.0) as usize;
     let scale = format!("├{}┤ {} m", "─".repeat(cells.saturating_sub(2)), shortest(length_m));

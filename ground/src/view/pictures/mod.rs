@@ -148,17 +148,24 @@ fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
 /// Columns of the numbers beside a scale.
 const SCALE_COLUMNS: u16 = 5;
 
-/// Round numbers from one value to another, in at most this many parts, but two.
-pub fn ticks([low, high]: [f64; 2], parts_max: u16) -> Vec<f64> {
-    let step = widgets::tick_step(high - low, usize::from(parts_max.max(2)));
-    widgets::ticks(low, high, step).collect()
+/// The ends of an axis over this many cells, which include two values, and its ticks at round
+/// numbers. All ticks are equally many cells apart, about `apart` if there are more than two.
+fn axis([low, high]: [f64; 2], cells: u16, dots: f64, apart: u16) -> ([f64; 2], Vec<f64>) {
+    let step = widgets::tick_step(high - low, usize::from(((cells + 1) / apart).max(2)));
+    // One cell less, because the axis begins at a whole cell.
+    let room = f64::from(cells) - 1.0 - 1.0 / dots;
+    let per_step = libm::floor(room * step / (high - low)).clamp(1.0, room.max(1.0));
+    let cell = step / per_step;
+    let low = libm::floor(low / cell) * cell;
+    let high = high.max(low + cell * (room + 1.0));
+    ([low, high], widgets::ticks(low, high, step).collect())
 }
 
 /// Draws the scales of a picture of one number over another: ticks with their numbers, and thin
-/// lines. Returns the plane inside. `across` are the numbers under it, `up` those at its left.
+/// lines. Returns the plane inside. `apart` are the least columns and rows between two ticks.
 pub fn scales(
     (x, y): ([f64; 2], [f64; 2]),
-    (across, up): (&[f64], &[f64]),
+    apart: [u16; 2],
     unit: &str,
     theme: Theme,
     frame: &mut Frame,
@@ -170,20 +177,22 @@ pub fn scales(
         height: area.height.saturating_sub(1),
         ..area
     };
+    let (x, across) = axis(x, inside.width, DOTS_ACROSS, apart[0]);
+    let (y, up) = axis(y, inside.height, DOTS_UP, apart[1]);
     let plane = Plane { area: inside, x, y };
     let label = theme.style(TextRole::Label);
     for at in up {
-        let Some((_, row)) = plane.cell(x[0], *at) else { continue };
-        let text = format!("{:>4}", shortest(*at));
+        let Some((_, row)) = plane.cell(x[0], at) else { continue };
+        let text = format!("{:>4}", shortest(at));
         frame.buffer_mut().set_string(area.x, row, text, label);
         // The ground is a line, the others a tick: a slow line has no bytes for more.
-        let line = if *at == 0.0 { "─".repeat(inside.width.into()) } else { "┄".to_owned() };
+        let line = if at == 0.0 { "─".repeat(inside.width.into()) } else { "┄".to_owned() };
         frame.buffer_mut().set_string(inside.x, row, line, theme.border());
     }
     let room = inside.width.saturating_sub(unit.chars().count() as u16 + 1);
     for at in across {
-        let Some((column, _)) = plane.cell(*at, y[0]) else { continue };
-        let text = shortest(*at);
+        let Some((column, _)) = plane.cell(at, y[0]) else { continue };
+        let text = shortest(at);
         if column + text.len() as u16 <= inside.x + room {
             frame.buffer_mut().set_string(column, inside.bottom(), text, label);
         }
@@ -195,4 +204,38 @@ pub fn scales(
 /// A moment in seconds since another, negative before it.
 pub fn seconds_since(at: Duration, zero: Duration) -> f64 {
     at.as_secs_f64() - zero.as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_equally_many_cells_apart_and_the_axis_includes_both_values() {
+        for (low, high) in [(0.0, 278.0), (-3.2, 14.7), (0.0, 0.013), (-12.5, -11.9), (9.0, 20.0)] {
+            for cells in 8..120_u16 {
+                let (bounds, ticks) = axis([low, high], cells, DOTS_UP, 3);
+                assert!(bounds[0] <= low + 1e-9 && bounds[1] >= high, "{low} to {high}: {bounds:?}");
+                let area = Rect { x: 0, y: 0, width: 1, height: cells };
+                let plane = Plane { area, x: [0.0, 1.0], y: bounds };
+                let rows: Vec<u16> =
+                    ticks.iter().map(|tick| plane.cell(0.0, *tick).expect("inside").1).collect();
+                let apart: Vec<u16> = rows.windows(2).map(|pair| pair[0] - pair[1]).collect();
+                assert!(
+                    apart.windows(2).all(|pair| pair[0] == pair[1]),
+                    "{low} to {high}, {cells}: {rows:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_line_of_zero_is_the_lowest_row_of_a_height() {
+        for cells in 8..120_u16 {
+            let (y, _) = axis([0.0, 278.0], cells, DOTS_UP, 3);
+            let area = Rect { x: 0, y: 0, width: 1, height: cells };
+            let plane = Plane { area, x: [0.0, 1.0], y };
+            assert_eq!(plane.cell(0.0, 0.0), Some((0, cells - 1)));
+        }
+    }
 }
