@@ -224,8 +224,10 @@ mod tests {
         let mut bytes = [entry(1), vec![0; 5_000_000], entry(2), vec![0; 100_000]].concat();
         bytes.push(MAGIC_2);
         let mut reader = TlogReader::new(bytes.as_slice());
-        let times: Vec<u64> =
-            std::iter::from_fn(|| reader.next_frame().ok().flatten()).map(|frame| frame.time_us).collect();
+        let mut times = Vec::new();
+        while let Some(frame) = reader.next_frame()? {
+            times.push(frame.time_us);
+        }
         assert_eq!((times, reader.garbage_bytes()), (vec![1, 2], 5_100_001));
         Ok(())
     }

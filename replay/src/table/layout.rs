@@ -31,32 +31,33 @@ impl Scalar {
     /// `None` for what has no cell: messages, enums, bytes.
     pub(super) fn of(kind: &FieldKind) -> Option<Self> {
         macro_rules! scalar {
-            ($column:ident, $wire:ident, $module:ident, $cell:expr) => {{
+            ($column:ident, $wire:ident, $module:ident: $value:ty, $cell:expr) => {{
                 let read = |wire: WireType, data: &mut &[u8]| {
-                    let mut value = Default::default();
+                    let mut value = <$value>::default();
                     encoding::$module::merge(wire, &mut value, data, DecodeContext::default())?;
-                    Ok($cell(value))
+                    let cell: fn($value) -> Cell = $cell;
+                    Ok(cell(value))
                 };
                 Self { column: Kind::$column, wire: $wire, read }
             }};
         }
         Some(match kind {
-            FieldKind::Double => scalar!(Float, SixtyFourBit, double, Cell::Float),
-            FieldKind::Float => scalar!(Float, ThirtyTwoBit, float, |n: f32| Cell::Float(n.into())),
-            FieldKind::Int32 => scalar!(Integer, Varint, int32, |n: i32| Cell::Integer(n.into())),
-            FieldKind::Sint32 => scalar!(Integer, Varint, sint32, |n: i32| Cell::Integer(n.into())),
-            FieldKind::Uint32 => scalar!(Integer, Varint, uint32, |n: u32| Cell::Integer(n.into())),
-            FieldKind::Int64 => scalar!(Integer, Varint, int64, Cell::Integer),
-            FieldKind::Sint64 => scalar!(Integer, Varint, sint64, Cell::Integer),
-            FieldKind::Uint64 => scalar!(Integer, Varint, uint64, |n: u64| Cell::Integer(n.cast_signed())),
-            FieldKind::Sfixed32 => scalar!(Integer, ThirtyTwoBit, sfixed32, |n: i32| Cell::Integer(n.into())),
-            FieldKind::Fixed32 => scalar!(Integer, ThirtyTwoBit, fixed32, |n: u32| Cell::Integer(n.into())),
-            FieldKind::Sfixed64 => scalar!(Integer, SixtyFourBit, sfixed64, Cell::Integer),
+            FieldKind::Double => scalar!(Float, SixtyFourBit, double: f64, Cell::Float),
+            FieldKind::Float => scalar!(Float, ThirtyTwoBit, float: f32, |n| Cell::Float(n.into())),
+            FieldKind::Int32 => scalar!(Integer, Varint, int32: i32, |n| Cell::Integer(n.into())),
+            FieldKind::Sint32 => scalar!(Integer, Varint, sint32: i32, |n| Cell::Integer(n.into())),
+            FieldKind::Uint32 => scalar!(Integer, Varint, uint32: u32, |n| Cell::Integer(n.into())),
+            FieldKind::Int64 => scalar!(Integer, Varint, int64: i64, Cell::Integer),
+            FieldKind::Sint64 => scalar!(Integer, Varint, sint64: i64, Cell::Integer),
+            FieldKind::Uint64 => scalar!(Integer, Varint, uint64: u64, |n| Cell::Integer(n.cast_signed())),
+            FieldKind::Sfixed32 => scalar!(Integer, ThirtyTwoBit, sfixed32: i32, |n| Cell::Integer(n.into())),
+            FieldKind::Fixed32 => scalar!(Integer, ThirtyTwoBit, fixed32: u32, |n| Cell::Integer(n.into())),
+            FieldKind::Sfixed64 => scalar!(Integer, SixtyFourBit, sfixed64: i64, Cell::Integer),
             FieldKind::Fixed64 => {
-                scalar!(Integer, SixtyFourBit, fixed64, |n: u64| Cell::Integer(n.cast_signed()))
+                scalar!(Integer, SixtyFourBit, fixed64: u64, |n| Cell::Integer(n.cast_signed()))
             }
-            FieldKind::Bool => scalar!(Integer, Varint, bool, |flag: bool| Cell::Integer(flag.into())),
-            FieldKind::String => scalar!(Text, LengthDelimited, string, Cell::Text),
+            FieldKind::Bool => scalar!(Integer, Varint, bool: bool, |flag| Cell::Integer(flag.into())),
+            FieldKind::String => scalar!(Text, LengthDelimited, string: String, Cell::Text),
             _ => return None,
         })
     }
