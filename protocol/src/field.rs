@@ -25,8 +25,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Self; 5] =
-        [Self::Boundary, Self::Road, Self::CrowdLine, Self::Trees, Self::LandingArea];
+    pub const ALL: [Self; 5] = [Self::Boundary, Self::Road, Self::CrowdLine, Self::Trees, Self::LandingArea];
 
     /// Its name in files and on screens.
     pub const fn name(self) -> &'static str {
@@ -194,7 +193,9 @@ fn of_geojson(text: &str) -> Result<Vec<Feature>, String> {
     let features = match parsed {
         GeoJson::FeatureCollection(collection) => collection.features,
         GeoJson::Feature(feature) => vec![feature],
-        GeoJson::Geometry(_) => return Err("a geometry has no kind; accepted: a FeatureCollection".to_owned()),
+        GeoJson::Geometry(_) => {
+            return Err("a geometry has no kind; accepted: a FeatureCollection".to_owned());
+        }
     };
     let read = features.into_iter().map(|feature| {
         let text = |key: &str| feature.property(key).and_then(|value| value.as_str()).map(str::to_owned);
@@ -298,10 +299,14 @@ mod tests {
         for (text, words) in [
             ("", "field: neither GeoJSON nor KML: ".to_owned()),
             ("<kml>", "field: neither GeoJSON nor KML: ".to_owned()),
-            ("{\"type\": \"FeatureCollection\", \"features\": []}", "field: has 0 points; accepted: 1 to 20000".to_owned()),
+            (
+                "{\"type\": \"FeatureCollection\", \"features\": []}",
+                "field: has 0 points; accepted: 1 to 20000".to_owned(),
+            ),
             (
                 "{\"type\": \"Point\", \"coordinates\": [1, 2]}",
-                "field: neither GeoJSON nor KML: a geometry has no kind; accepted: a FeatureCollection".to_owned(),
+                "field: neither GeoJSON nor KML: a geometry has no kind; accepted: a FeatureCollection"
+                    .to_owned(),
             ),
             (
                 &GEOJSON.replace("\"kind\": \"trees\"", "\"kind\": \"pond\""),
@@ -309,7 +314,8 @@ mod tests {
             ),
             (
                 &GEOJSON.replace("[-117.812, 35.3461]", "[35.3461, -117.812]"),
-                "field: feature 1 (spectators): longitude 35.3461, latitude -117.812; accepted: -180 to 180".to_owned(),
+                "field: feature 1 (spectators): longitude 35.3461, latitude -117.812; accepted: -180 to 180"
+                    .to_owned(),
             ),
             (
                 &KML.replace("-117.812,35.3461,0", "-11.7812,35.3461,0"),
