@@ -11,6 +11,7 @@ mod command_fly_log;
 mod custom_vehicles;
 mod drawing;
 mod faults;
+mod field;
 mod findings;
 mod hazard;
 #[path = "../../flight/tests/missions/mod.rs"]

@@ -1,6 +1,9 @@
 //! Where the vehicle was: its main moments, and the place from above.
 
 use flight::rules::phase::Phase;
+use protocol::field::{Field, Kind};
+use protocol::motion::Degrees;
+use sim::wire::field::{RUN_FACT, pad_of};
 
 use crate::report::chart::{Chart, Line, line};
 use crate::report::html::table;
@@ -44,12 +47,38 @@ pub(super) fn maps(flight: &Flight) -> String {
         x_name: "east, m",
         size_px: Some((140.0, 140.0)),
         places: places(flight),
-        lines: stages(flight).into_iter().chain(more).collect(),
+        lines: stages(flight).into_iter().chain(more).chain(field_lines(flight)).collect(),
         arrow: arrow.clone(),
         ..Chart::default()
     };
     let Some(fence) = fence else { return picture(COMPLETE, None).svg() };
-    picture(COMPLETE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
+    picture(COMPLETE, Some(fence)).svg()
+        + &picture("The same closer, m", None).svg()
+        + &field_distances(flight)
+}
+
+/// The field around the pad that the log has.
+fn field_of(flight: &Flight) -> Option<(Field, Degrees)> {
+    let pad = pad_of(flight.pilot.as_ref()?.mission());
+    Some((Field::parse(flight.recording.head.run.get(RUN_FACT)?, pad, RUN_FACT).ok()?, pad))
+}
+
+/// Its lines east and north of the pad, m.
+fn field_lines(flight: &Flight) -> Vec<Line> {
+    let lines = field_of(flight).into_iter().flat_map(|(field, pad)| field.lines_m(pad).collect::<Vec<_>>());
+    let turned = |(kind, points): (Kind, Vec<(f64, f64)>)| {
+        let class = if kind == Kind::CrowdLine { "fence" } else { "thin" };
+        line(kind.name(), class, points.into_iter().map(|(north, east)| (east, north)).collect())
+    };
+    lines.map(turned).collect()
+}
+
+/// How far from the lines of the field it came down.
+fn field_distances(flight: &Flight) -> String {
+    let at = flight.contact().zip(field_of(flight));
+    at.map_or_else(String::new, |([north, east, ..], (field, pad))| {
+        format!("<p>Touchdown to the nearest {}</p>\n", field.distances(pad, (north, east)))
+    })
 }
 
 /// The pad, where the first plan ends, and where it came down.
