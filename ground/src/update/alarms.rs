@@ -10,8 +10,8 @@ use protocol::identity::Address;
 
 use crate::model::{
     Acknowledgement, Action, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
-    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, dead_reckoning::may_have_left, field, foreign_name,
-    hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
+    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, dead_reckoning::may_have_left, field,
+    foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
