@@ -58,7 +58,7 @@ mod tests {
         model
     }
 
-    /// A degree of latitude is 110,957 m there.
+    /// A degree of latitude is 110,947 m there.
     #[test]
     fn val_wgs84_distances_from_a_position_east_and_north_of_the_pad() {
         let model = model(0.001);
