@@ -227,12 +227,12 @@ pub fn check(
     rows.extend(without_place(&recipe.mission.sensors));
     rows.extend(crate::field::crowd(recipe));
     if flights > 0 {
-        rows.push(flown(recipe, &fly(recipe, flights, done)?));
+        rows.push(flown(recipe, &fly(recipe, 0..flights, done)?));
     }
     let Mission { name, site, airframe, motor_curve, .. } = &recipe.mission;
     let EvenLanding { height_m, speed_m_s, .. } = vehicle.landing;
     let title = format!(
-        "{name}: {:.3} kg on {}, lit at about {height_m:.0} m and {speed_m_s:.0} m/s\nSite: {site}\nWind: {}",
+        "{name}: {:.3} kg on {}, ignition at about {height_m:.0} m and {speed_m_s:.0} m/s\nSite: {site}\nWind: {}",
         airframe.mass.loaded_kg,
         motor_curve.name(),
         recipe.dispersion.wind_over_height()
@@ -557,7 +557,7 @@ impl<'a> Vehicle<'a> {
         let [slow, decided] =
             [CANOPY_M_S.judge(-canopy_m_s), DECIDED_S.judge((height_m - opens_m) / speed_m_s)];
         let found = format!("{canopy_m_s:.1} m/s, opens in {opens_m:.0} m");
-        let beside = format!("{} m/s, lit at {height_m:.0} m", -CANOPY_M_S.1);
+        let beside = format!("{} m/s, ignition at {height_m:.0} m", -CANOPY_M_S.1);
         Row::new("parachute", slow.max(decided), found, beside).or(|| {
             let larger_m2 = parachute.area_m2 * canopy_m_s * canopy_m_s / (CANOPY_M_S.1 * CANOPY_M_S.1);
             if slow > Verdict::Ok {

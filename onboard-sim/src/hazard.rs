@@ -2,12 +2,12 @@
 //! people.
 //!
 //! Each flight is flown as drawn. Copies of it are aborted under way, each at a moment drawn evenly
-//! from one part of that flight. The cases with a fault are separate flights with the same
-//! draws.
+//! from one part of that flight, or get a fault before it acts. A vehicle that lifts off
+//! uncommanded is a separate flight with the same draws.
 
 use core::fmt;
 
-use flight::computer::{AbortEffect, FRAME_MS};
+use flight::computer::AbortEffect;
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
 use flight::rules::verdict::Landing;
@@ -22,7 +22,9 @@ use sim::fault::TimedFault;
 use sim::recipe::Recipe;
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::ground::RestOutcome;
-use sim::world::{Actuators, Fault, Wind};
+use sim::world::plant::LONG_STRIDE;
+use sim::world::wind::Wind;
+use sim::world::{Actuators, Fault};
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::run::{RunError, in_parallel};
@@ -55,7 +57,7 @@ pub enum Case {
     AbortTooLow = "aborted below commit",
     /// Aborted under the landing motor.
     AbortUnderThrust = "aborted under thrust",
-    NoLight = "landing motor not lit",
+    NoLight = "landing motor not ignited",
     NoSeparation = "booster stays on",
     /// A disarmed vehicle lifts off.
     Uncommanded = "uncommanded lift-off",
@@ -106,9 +108,19 @@ impl Case {
         Self::ALL.into_iter().filter(happens).collect()
     }
 
-    /// Whether it is a separate flight, and not a part of the nominal one.
-    fn is_alone(self) -> bool {
-        self == Self::Uncommanded || !self.faults().is_empty()
+    /// A copy of the nominal flight in this phase gets the faults of the case: they act later.
+    fn breaks(self, phase: Phase) -> bool {
+        let falls = !phase.before_apogee();
+        if self == Self::NoLight {
+            return falls && phase != Phase::Deploy;
+        }
+        !self.faults().is_empty() && (falls || phase == Phase::Coast)
+    }
+
+    /// Whether the nominal flight is needed beyond its apogee.
+    fn needs_descent(self) -> bool {
+        let leaves = [Self::AbortInAscent, Self::ParachuteFromApogee, Self::Booster].contains(&self);
+        self == Self::NoLight || self.faults().is_empty() && !leaves
     }
 
     /// The abort of a flight at this moment would end it so.
@@ -257,7 +269,7 @@ impl Radius {
 /// How many flights are flown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flights {
-    /// Flights of every case.
+    /// Flights as planned, and of every case that comes half as far as the farthest.
     pub survey: u64,
     /// Flights of the cases that reached nearly as far as the farthest.
     pub of_widest: u64,
@@ -266,6 +278,9 @@ pub struct Flights {
 /// Share of the farthest distance from which a case counts among the widest, by its farthest
 /// flight in the survey.
 const NEARLY: f64 = 0.9;
+/// Flights after which a case that has not come half as far as the farthest ends its survey.
+const GLANCE: u64 = 25;
+const HALF: f64 = 0.5;
 
 /// [`study`] of each recipe. `done` gets how many flights of all are flown, of about how many.
 ///
@@ -298,8 +313,7 @@ pub fn study(
     done: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Impact>, RunError> {
     let Flights { survey, of_widest } = Flights { survey: flights.survey.min(flights.of_widest), ..flights };
-    let cases = Case::of(&recipe.mission);
-    let (surveyed, more) = (survey as usize * cases.len(), (of_widest - survey) as usize);
+    let mut cases = Case::of(&recipe.mission);
     let fly_some = |cases: &[Case], numbers: core::ops::Range<u64>, show: &(dyn Fn(usize) + Sync)| {
         let numbers: Vec<u64> = numbers.collect();
         let one = |number: &u64| {
@@ -308,13 +322,21 @@ pub fn study(
         let flown = in_parallel(&numbers, one, &|flown| show(flown * cases.len()));
         Ok::<_, RunError>(flown.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     };
-    done(0, surveyed + more);
-    let mut impacts = fly_some(&cases, 0..survey, &|flown| done(flown, surveyed + more))?;
-    let farthest_m = |case: Case| Radius::of_case(&impacts, case).map_or(0.0, |radius| radius.farthest_m);
-    let widest_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
-    let widest: Vec<Case> = cases.into_iter().filter(|case| farthest_m(*case) >= NEARLY * widest_m).collect();
-    let of = surveyed + more * widest.len();
-    impacts.extend(fly_some(&widest, survey..of_widest, &|flown| done(surveyed + flown, of))?);
+    let (mut impacts, mut from) = (Vec::<Impact>::new(), 0);
+    // The rate of landings needs all flights of the survey.
+    let stages = [(survey.min(GLANCE), 0.0, true), (survey, HALF, true), (of_widest, NEARLY, false)];
+    for (to, share, rate) in stages {
+        let farthest_m = |case: Case| {
+            let of_case = impacts.iter().filter(|impact| impact.case == case);
+            of_case.map(Impact::distance_m).fold(0.0, f64::max)
+        };
+        let least_m = share * cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
+        cases.retain(|case| farthest_m(*case) >= least_m || rate && *case == Case::AsPlanned);
+        let before = impacts.len();
+        let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize;
+        impacts.extend(fly_some(&cases, from..to, &|flown| done(before + flown, of))?);
+        from = to;
+    }
     Ok(impacts)
 }
 
@@ -330,8 +352,8 @@ pub fn widest(impacts: &[Impact]) -> Option<(Case, Radius)> {
     })
 }
 
-/// Keep-out distance, m: the larger one of flights and rule, rounded up to ten metres.
-pub fn keep_out_m(radius: &Radius, rule: &Rule) -> f64 {
+/// Exclusion distance, m: the larger one of flights and rule, rounded up to ten metres.
+pub fn exclusion_m(radius: &Radius, rule: &Rule) -> f64 {
     10.0 * libm::ceil(radius.outside_m().max(rule.distance_m()) / 10.0)
 }
 
@@ -346,21 +368,23 @@ pub fn fly(recipe: &Recipe, cases: &[Case], number: u64) -> Result<Vec<Impact>, 
     let mut add = |case: Case, (place_m, course), landing| {
         impacts.push(Impact { case, number, place_m, downwind_rad, landing, course });
     };
-    let (alone, beside): (Vec<Case>, Vec<Case>) = cases.iter().partition(|case| case.is_alone());
+    let (alone, beside): (Vec<Case>, Vec<Case>) = cases.iter().partition(|case| **case == Case::Uncommanded);
     if !beside.is_empty() {
-        let begin = |case: &Case| Branch { case: *case, aborted: None, frames: 0 };
+        let begin = |case: &Case| Branch { case: *case, copy: None, frames: 0 };
         let mut branches: Vec<Branch> = beside.iter().map(begin).collect();
         let mut chance = Chance::of(recipe.seed ^ OF_HAZARD, number);
         let mut flight = Sortie::new(recipe, number)?;
         let (mut attached, mut booster) = (flight.world().booster_attached(), None);
-        let to_the_ground = beside
-            .iter()
-            .any(|case| !matches!(case, Case::AbortInAscent | Case::ParachuteFromApogee | Case::Booster));
+        let to_the_ground = beside.iter().any(|case| case.needs_descent());
         let planned = come_down(&mut flight, |flight| {
             let computer = flight.computer();
             let (phase, effect) = (computer.mode().phase, computer.abort_effect());
-            for branch in branches.iter_mut().filter(|branch| branch.case.aborts(phase, effect)) {
-                branch.take(flight, &mut chance);
+            for branch in &mut branches {
+                if branch.case.aborts(phase, effect) {
+                    branch.take(flight, &mut chance);
+                } else if branch.copy.is_none() && branch.case.breaks(phase) {
+                    branch.copy = Some(Box::new(flight.clone()));
+                }
             }
             if attached && !flight.world().booster_attached() {
                 booster = spent_booster_m(flight);
@@ -369,17 +393,24 @@ pub fn fly(recipe: &Recipe, cases: &[Case], number: u64) -> Result<Vec<Impact>, 
             to_the_ground || phase.before_apogee() || phase == Phase::Deploy
         });
         for branch in branches {
-            match (branch.case, branch.aborted) {
+            match (branch.case, branch.copy) {
                 (Case::AsPlanned, _) => add(Case::AsPlanned, planned, flight.outcome().landing),
                 (Case::Booster, _) => {
                     if let Some(place_m) = booster {
                         add(Case::Booster, (Some(place_m), Course::default()), Landing::default());
                     }
                 }
-                (case, Some(mut aborted)) => {
-                    aborted.abort();
-                    let down = come_down(&mut aborted, |_| true);
-                    add(case, down, aborted.outcome().landing);
+                (case, Some(mut copy)) => {
+                    let faults: Vec<TimedFault> =
+                        case.faults().iter().filter_map(|fault| fault.parse().ok()).collect();
+                    if faults.is_empty() {
+                        copy.abort();
+                    }
+                    for fault in &faults {
+                        copy.break_down(&fault.breakage);
+                    }
+                    let down = come_down(&mut copy, |_| true);
+                    add(case, down, copy.outcome().landing);
                 }
                 // This flight had no such part.
                 (_, None) => {}
@@ -387,13 +418,7 @@ pub fn fly(recipe: &Recipe, cases: &[Case], number: u64) -> Result<Vec<Impact>, 
         }
     }
     for case in alone {
-        let mut flight = if case == Case::Uncommanded {
-            uncommanded(recipe, number)?
-        } else {
-            let faults: Vec<TimedFault> =
-                case.faults().iter().filter_map(|fault| fault.parse().ok()).collect();
-            Sortie::new(&Recipe { faults, ..recipe.clone() }, number)?
-        };
+        let mut flight = uncommanded(recipe, number)?;
         let down = come_down(&mut flight, |_| true);
         add(case, down, flight.outcome().landing);
     }
@@ -408,10 +433,10 @@ pub fn landed_as_planned(impacts: &[Impact]) -> Landings {
     Landings::of(planned.map(|impact| impact.landing))
 }
 
-/// A copy of a flight, to be aborted.
+/// A copy of a flight, to be aborted or to get a fault.
 struct Branch {
     case: Case,
-    aborted: Option<Box<Sortie>>,
+    copy: Option<Box<Sortie>>,
     frames: u64,
 }
 
@@ -423,7 +448,7 @@ impl Branch {
         let first = self.case == Case::ParachuteFromApogee;
         let selected = if first { self.frames == 1 } else { chance.unit() * (self.frames as f64) < 1.0 };
         if selected {
-            self.aborted = Some(Box::new(flight.clone()));
+            self.copy = Some(Box::new(flight.clone()));
         }
     }
 }
@@ -448,7 +473,7 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Opt
                     Actuators { gimbal_rad: last.gimbal_rad, fins_rad: last.fins_rad, ..Actuators::NONE };
                 while goes_on(flight) {
                     course.note(flight);
-                    flight.world_mut().advance(&held, FRAME_MS as usize);
+                    flight.world_mut().advance(&held, LONG_STRIDE);
                 }
             }
         } else {

@@ -102,13 +102,16 @@ pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) 
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Flies flights 0 to `flights` of a recipe, and those of a campaign with it, and returns their
-/// rows. `done` gets the number of flights flown.
+/// Flies some flights of a recipe, those of a campaign with it, and returns their rows. `done` gets the number of flights flown.
 ///
 /// # Errors
 /// The first flight that cannot be set up or panics.
-pub fn fly(recipe: &Recipe, flights: u64, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>, RunError> {
-    let numbers: Vec<u64> = (0..flights).collect();
+pub fn fly(
+    recipe: &Recipe,
+    flights: core::ops::Range<u64>,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Vec<Row>, RunError> {
+    let numbers: Vec<u64> = flights.collect();
     in_parallel(&numbers, |number| fly_caught(recipe, *number), done).into_iter().collect()
 }
 

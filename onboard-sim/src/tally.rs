@@ -18,6 +18,9 @@ const AT_STOP_SHARE: f64 = 0.999;
 /// still use its estimate, s.
 const MOTOR_ESTIMATED_S: f64 = 3.0;
 
+/// Frames between two looks at the consistency of the estimate.
+const NEES_EVERY: u64 = 10;
+
 /// A running flight, and the values collected for its row.
 pub struct Tally {
     flight: Sortie,
@@ -83,7 +86,10 @@ impl Tally {
         }
         let burning_s = world.thrust_begins_s().map_or(-1.0, |begins_s| world.time_s() - begins_s);
         if burning_s >= 0.0 {
-            if let Some(nees) = flight.nees_of_motion() {
+            // It changes slowly.
+            if flight.frame().is_multiple_of(NEES_EVERY)
+                && let Some(nees) = flight.nees_of_motion()
+            {
                 self.nees_of_motion = (self.nees_of_motion.0 + nees, self.nees_of_motion.1 + 1);
             }
             if burning_s >= MOTOR_ESTIMATED_S && row.nees_of_motor.is_none() {

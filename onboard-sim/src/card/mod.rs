@@ -75,15 +75,19 @@ impl Card {
         let begin = |day: Recipe| if from_the_pad { day.starting_at(StartPoint::Pad) } else { Ok(day) };
         let days = days.into_iter().map(begin).collect::<Result<Vec<_>, _>>()?;
         let calmest = days.first().ok_or(CardError::NoWind)?;
-        refuse_without_a_landing(calmest, show)?;
-        let impacts = hazard::studies(&days, flights, show)?;
+        refuse_without_a_landing(calmest)?;
+        let at_masses = 2 * MOST_MASSES * flights.survey as usize;
+        show(0, at_masses);
+        let impacts = hazard::studies(&days, flights, &|done, of| show(done, of + at_masses))?;
+        let before: usize = impacts.iter().map(Vec::len).sum();
+        let show = |done| show(before + done, before + at_masses);
         let aloft = recipe.dispersion.winds_aloft.as_ref();
         let nominal = landed_as_planned(impacts.first().map_or(&[], Vec::as_slice));
         Ok(Self {
             recipe: recipe.clone(),
             start: calmest.mission.start.at,
             flown: winds_m_s.into_iter().zip(impacts).collect(),
-            masses: masses(calmest, nominal, flights.survey, show)?,
+            masses: masses(calmest, nominal, flights.survey, &show)?,
             flights,
             rule: Rule::of(&calmest.mission),
             wind_from_deg: wind_from_deg.or(aloft.map(WindsAloft::from_deg)),
@@ -97,10 +101,9 @@ impl Card {
 }
 
 /// Some flights, before many are flown.
-fn refuse_without_a_landing(recipe: &Recipe, show: &(dyn Fn(usize, usize) + Sync)) -> Result<(), CardError> {
+fn refuse_without_a_landing(recipe: &Recipe) -> Result<(), CardError> {
     const FIRST: u64 = 12;
-    show(0, FIRST as usize);
-    let rows = fly(recipe, FIRST, &|done| show(done, FIRST as usize))?;
+    let rows = fly(recipe, 0..FIRST, &|_| ())?;
     if rows.iter().any(|row| row.stands) {
         return Ok(());
     }
@@ -108,36 +111,67 @@ fn refuse_without_a_landing(recipe: &Recipe, show: &(dyn Fn(usize, usize) + Sync
     Err(CardError::NoneLanded { flights: FIRST, set: recipe.dispersion_name.clone(), reason })
 }
 
-/// Landing rates at the mission's mass and at others, on each side up to the first at which fewer
-/// than nine of ten land. Ballast is at the centre of gravity.
+/// Between neighbouring masses, as a share of the nominal mass, and the steps on each side.
+const STEP: f64 = 0.02;
+const STEPS: u32 = 10;
+/// Most masses flown on a side: the halvings of its steps.
+const MOST_MASSES: usize = 4;
+
+/// Landing rates at the mission's mass and, on each side, at the farthest at which nine of ten land
+/// and the nearest at which fewer do: the steps between are halved, because the rate only falls
+/// with the distance. Ballast is at the centre of gravity.
 fn masses(
     recipe: &Recipe,
     nominal: Landings,
     flights: u64,
-    show: &(dyn Fn(usize, usize) + Sync),
+    show: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<(f64, Landings)>, CardError> {
-    /// Between neighbours, as a share of the nominal mass, and most of them on each side.
-    const STEP: f64 = 0.02;
-    const STEPS: i32 = 10;
     let airframe = &recipe.mission.airframe;
     let (frame, nominal_kg) = (Frame::of(&recipe.mission)?, airframe.mass.loaded_kg);
     let mut found = vec![(nominal_kg, nominal)];
-    for side in [-1, 1] {
-        let mut share = nominal.stands.share;
-        for step in 1..=STEPS {
-            let mass = frame.with(&recipe.mission.motor_curve, f64::from(side * step) * STEP * nominal_kg);
-            let Ok(other) = changed(recipe, &airframe.motor, &mass) else { break };
-            if share < NINE_OF_TEN {
-                break;
-            }
-            let rows = fly(&other, flights, &|done| show(done, flights as usize))?;
-            let landings = Landings::of(rows.iter().map(Row::landing));
-            share = landings.stands.share;
-            found.push((mass.loaded_kg, landings));
+    let (mut flown, most) = (0, 2 * MOST_MASSES * flights as usize);
+    let going_on = |flown: usize| show(flown.min(most.saturating_sub(1)));
+    for side in [-1.0, 1.0] {
+        if nominal.stands.share < NINE_OF_TEN {
+            break;
         }
+        let (mut good, mut bad) = ((0, None), (STEPS + 1, None));
+        while bad.0 - good.0 > 1 {
+            let step = good.0.midpoint(bad.0);
+            let mass = frame.with(&recipe.mission.motor_curve, side * f64::from(step) * STEP * nominal_kg);
+            let landings = match changed(recipe, &airframe.motor, &mass) {
+                Ok(other) => Some(decided(&other, flights, &|done| going_on(flown + done))?),
+                Err(_) => None,
+            };
+            flown += flights as usize;
+            going_on(flown);
+            let at = landings.map(|landings| (mass.loaded_kg, landings));
+            let lands = landings.is_some_and(|landings| landings.stands.share >= NINE_OF_TEN);
+            *(if lands { &mut good } else { &mut bad }) = (step, at);
+        }
+        found.extend([good.1, bad.1].into_iter().flatten());
     }
+    show(most);
     found.sort_by(|one, two| one.0.total_cmp(&two.0));
     Ok(found)
+}
+
+/// Flies until it is decided whether nine of ten land: until 0.9 is outside of the interval of the
+/// rate, or so many flights are flown.
+fn decided(recipe: &Recipe, flights: u64, done: &(dyn Fn(usize) + Sync)) -> Result<Landings, CardError> {
+    /// Between two looks.
+    const BATCH: u64 = 25;
+    let mut rows = Vec::new();
+    loop {
+        let from = rows.len() as u64;
+        let to = flights.min(from + BATCH);
+        rows.extend(fly(recipe, from..to, &|flown| done(from as usize + flown))?);
+        let landings = Landings::of(rows.iter().map(Row::landing));
+        let open = (landings.stands.low..=landings.stands.high).contains(&NINE_OF_TEN);
+        if to == flights || !open {
+            return Ok(landings);
+        }
+    }
 }
 
 /// Landing rate from which a mass is suitable.

@@ -8,7 +8,7 @@ use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
 
 use super::sheet::words_of;
-use crate::hazard::{Case, Impact, Radius, Rule, keep_out_m, landed_as_planned, lift_off_kg, widest};
+use crate::hazard::{Case, Impact, Radius, Rule, exclusion_m, landed_as_planned, lift_off_kg, widest};
 use crate::statistics::Landings;
 
 /// Fewest flights behind a stated rate or radius.
@@ -30,7 +30,7 @@ pub struct InWind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Circle {
     /// Radius about the landing pad required by flights and rule, in this wind and in less.
-    pub keep_out_m: f64,
+    pub exclusion_m: f64,
     /// The case with the farthest impacts, with its flights.
     pub case: Case,
     pub radius: Radius,
@@ -41,7 +41,7 @@ pub struct Circle {
 impl Circle {
     /// Distance of the launch crew, upwind of the pad, m.
     pub fn crew_m(&self) -> f64 {
-        self.keep_out_m + BESIDE_M
+        self.exclusion_m + BESIDE_M
     }
 }
 
@@ -53,8 +53,8 @@ pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
         let enough = landed.stands.of >= FEWEST;
         let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
         let circle = widest.map(|(case, radius)| {
-            least_m = least_m.max(keep_out_m(&radius, rule));
-            Circle { keep_out_m: least_m, case, radius, farthest_m: farthest_m(impacts) }
+            least_m = least_m.max(exclusion_m(&radius, rule));
+            Circle { exclusion_m: least_m, case, radius, farthest_m: farthest_m(impacts) }
         });
         InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
     };
@@ -77,7 +77,7 @@ pub fn limit_m_s(winds: &[InWind]) -> Option<f64> {
     const SHARE: f64 = 0.9;
     let calmest = winds.first()?.landed?;
     // A radius without an upper end has no safe outside.
-    let ends = |circle: Circle| circle.keep_out_m.is_finite() && circle.radius.high_m.is_some();
+    let ends = |circle: Circle| circle.exclusion_m.is_finite() && circle.radius.high_m.is_some();
     let may_fly = |wind: &&InWind| {
         wind.wind_m_s <= PERMITTED_M_S
             && wind.circle.is_some_and(ends)
@@ -170,7 +170,7 @@ pub fn plan(
         let _ = write!(lines, "<polyline class=\"{kind}\" points=\"{points}\"/>");
     }
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
-        let radius = scale * circle.keep_out_m;
+        let radius = scale * circle.exclusion_m;
         let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");
         let [x, y] = at(-scale * circle.crew_m() - 1.0, 0.0);
         let _ = write!(lines, "<circle class=\"crew\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\"/>");

@@ -112,7 +112,7 @@ impl Card {
             ),
             sections: vec![
                 wind_table(winds),
-                rows("What a range officer asks", words_of("asked", &self.values(winds))),
+                rows("Questions of a range officer", words_of("officer", &self.values(winds))),
                 self.places(winds),
                 rows(
                     "What an abort does: Ctrl-X, then Enter, at any station; one person is enough",
@@ -194,7 +194,7 @@ impl Card {
                 extremes(self.flights(winds), |impact| impact.course.canopy_s).map(|[_, most]| rounded(most)),
             ),
             ("lying", Some(self.lying(winds))),
-            ("lit", self.as_planned(winds, |impact| impact.course.ignition_m).map(span)),
+            ("ignition", self.as_planned(winds, |impact| impact.course.ignition_m).map(span)),
             ("hold_s", Some(rounded(HOLD_LIMIT_S))),
             ("pad_s", Some(rounded(PAD_ABORT_WAIT_S))),
             ("misfire_s", Some(rounded(MISFIRE_WAIT_S))),
@@ -304,7 +304,7 @@ impl Card {
 
     /// The masses at which nine of ten land.
     fn nine_of_ten(&self) -> String {
-        let enough = self.masses.iter().all(|(_, landed)| landed.stands.of >= FEWEST);
+        let enough = self.flights.survey >= FEWEST;
         let mut good =
             self.masses.iter().filter(|(_, landed)| landed.stands.share >= NINE_OF_TEN).map(|(kg, _)| *kg);
         let own = self.masses.first().map(|(_, landed)| landed);
@@ -326,7 +326,7 @@ impl Card {
 fn people_m(winds: &[InWind]) -> f64 {
     let limit_m_s = limit_m_s(winds).unwrap_or(f64::INFINITY);
     let circles = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s).filter_map(|wind| wind.circle);
-    circles.map(|circle| circle.keep_out_m).fold(0.0, f64::max)
+    circles.map(|circle| circle.exclusion_m).fold(0.0, f64::max)
 }
 
 fn wind_table(winds: &[InWind]) -> Section {
@@ -355,8 +355,8 @@ fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
         if !may_fly {
             return ["DO NOT FLY".to_owned(), "-".to_owned()];
         }
-        let [keep_out_m, crew_m] = [circle.keep_out_m, circle.crew_m()];
-        [format!("{keep_out_m:.0} m"), format!("{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0))]
+        let [exclusion_m, crew_m] = [circle.exclusion_m, circle.crew_m()];
+        [format!("{exclusion_m:.0} m"), format!("{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0))]
     };
     let [people, crew] = wind.circle.map_or_else(|| ["none".to_owned(), "-".to_owned()], people);
     vec![

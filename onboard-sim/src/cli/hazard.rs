@@ -7,7 +7,9 @@ use clap::Args;
 use flight::rules::verdict::Landing;
 use flight::vehicle::mission::{Mission, StartPoint};
 use onboard_sim::files::NewFile;
-use onboard_sim::hazard::{self, Case, Flights, Impact, Radius, Rule, keep_out_m, landed_as_planned, widest};
+use onboard_sim::hazard::{
+    self, Case, Flights, Impact, Radius, Rule, exclusion_m, landed_as_planned, widest,
+};
 use onboard_sim::statistics::Landings;
 use protocol::program::Exit;
 use sim::dispersion::may_be_kinder;
@@ -32,12 +34,13 @@ pub(crate) struct HazardArguments {
         value_name = "M/S,..."
     )]
     winds: Vec<f64>,
-    /// Flights in each wind of every way, by which the ways are known that come down farthest.
+    /// Flights in each wind of every failure mode, by which those are found that come down farthest.
+    /// One that has not come half as far as the farthest ends after 25.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     flights: u64,
-    /// Flights in each wind of the ways that come down farthest. 368 are needed for an upper end of
+    /// Flights in each wind of the failure modes that come down farthest. 368 are needed for an upper end of
     /// the interval.
-    #[arg(long, default_value_t = 400, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, default_value_t = 368, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     hazard_flights: u64,
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
@@ -132,7 +135,7 @@ impl Study<'_> {
         )?;
         for (wind_m_s, impacts) in winds_m_s.iter().zip(self.impacts) {
             if let Some((case, radius)) = widest(impacts) {
-                let apart = keep_out_m(&radius, rule);
+                let apart = exclusion_m(&radius, rule);
                 let end =
                     if radius.high_m.is_none() { " at least: too few flights for an upper end;" } else { "" };
                 writeln!(out, "{wind_m_s:>4} m/s: nobody within {apart:.0} m;{end} widest: {}", case.name())?;

@@ -53,13 +53,13 @@ proptest! {
             for case in [Case::AsPlanned, Case::Uncommanded] {
                 let of_case = || impacts.iter().filter(|impact| impact.case == case);
                 let inside = |radius_m: f64| of_case().filter(|impact| impact.distance_m() <= radius_m).count();
-                prop_assert!(100 * inside(circle.keep_out_m) >= 99 * of_case().count());
+                prop_assert!(100 * inside(circle.exclusion_m) >= 99 * of_case().count());
                 prop_assert!(case != circle.case || 100 * inside(circle.radius.holds_m) >= 99 * of_case().count());
             }
             // Never less than in less wind, nor than the rule.
-            prop_assert!(circle.keep_out_m >= least_m && circle.keep_out_m >= rule().distance_m());
-            prop_assert!(circle.crew_m() > circle.keep_out_m, "the launch crew stands outside");
-            least_m = circle.keep_out_m;
+            prop_assert!(circle.exclusion_m >= least_m && circle.exclusion_m >= rule().distance_m());
+            prop_assert!(circle.crew_m() > circle.exclusion_m, "the launch crew stands outside");
+            least_m = circle.exclusion_m;
         }
     }
 
@@ -108,9 +108,9 @@ proptest! {
     }
 }
 
-fn circle(wind_m_s: f64, keep_out_m: f64) -> InWind {
+fn circle(wind_m_s: f64, exclusion_m: f64) -> InWind {
     let impacts: Vec<Impact> =
-        (0..400).map(|number| impact(Case::AsPlanned, number, keep_out_m - 5.0, 0.0, true)).collect();
+        (0..400).map(|number| impact(Case::AsPlanned, number, exclusion_m - 5.0, 0.0, true)).collect();
     in_winds(&[(wind_m_s, impacts)], &rule()).remove(0)
 }
 

@@ -24,7 +24,7 @@ fn thinner_air_changes_apogee_hazard_radius_card_check_and_campaign() {
     let found = sites.map(|(altitude_m, temperature_c)| {
         let recipe = recipe(altitude_m, temperature_c);
         let impacts = fly(&recipe, &[Case::AsPlanned, Case::BallisticWithBooster, Case::Booster], 3).unwrap();
-        let row = onboard_sim::run::fly(&recipe, 1, &|_| {}).unwrap().remove(0);
+        let row = onboard_sim::run::fly(&recipe, 0..1, &|_| {}).unwrap().remove(0);
         let page = check(&recipe, &[], 0, &|_| {}).unwrap().to_string();
         let flights = Flights { survey: 1, of_widest: 1 };
         let card = Card::new(&recipe, vec![(4.0, recipe.clone())], flights, None, &|_, _| {}).unwrap().text();

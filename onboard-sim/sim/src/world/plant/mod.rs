@@ -36,6 +36,8 @@ const NEAR_M: f64 = 0.1;
 /// Steps of a stride, for which the wind is held constant. A vehicle moves by 0.2 m in it; the
 /// shortest gusts are 3 m long.
 const STRIDE: usize = 5;
+/// Steps of a stride below an open parachute, in which the vehicle moves as far.
+pub const LONG_STRIDE: usize = 25;
 /// The density is taken as linear within this distance, m: it is wrong by a part in 10^9.
 const AIR_M: f64 = 0.5;
 /// Number of parts of a step near the ground, the time resolution of the first contact.
@@ -212,7 +214,15 @@ impl World {
     /// Returns their number.
     pub fn stride(&mut self, actuators: &Actuators, most: usize) -> usize {
         let wind_changes = self.steps.is_multiple_of(STRIDE as u64);
-        self.strode = if most >= STRIDE && wind_changes && self.may_stride() { STRIDE } else { 1 };
+        let long = most >= LONG_STRIDE && self.parachute.open_share() >= 1.0;
+        let may_stride = most >= STRIDE && wind_changes && self.may_stride();
+        self.strode = if !may_stride {
+            1
+        } else if long {
+            LONG_STRIDE
+        } else {
+            STRIDE
+        };
         let (from_s, over_s) = (self.time_s(), STEP_S * self.strode as f64);
         let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
         for step in 0..self.strode {
@@ -230,7 +240,8 @@ impl World {
             self.parachute.step(time_s, airspeed_m_s);
             if step == 0 {
                 if wind_changes {
-                    self.wind.step(self.state.position_m.z, airspeed_m_s * STEP_S * STRIDE as f64);
+                    let over_s = over_s.max(STEP_S * STRIDE as f64);
+                    self.wind.step(self.state.position_m.z, airspeed_m_s * over_s);
                 }
                 self.air.follow(&self.site, self.state.position_m.z);
                 self.burnt_kg = self.motor.burnt_kg(from_s + 0.5 * over_s);
@@ -249,14 +260,14 @@ impl World {
 
     fn move_on(&mut self, from_s: f64, over_s: f64) {
         if let Some(stack) = self.stack.take() {
-            self.ride(*stack, from_s, over_s, self.strode);
+            self.ride(*stack, from_s, over_s, self.strode.min(STRIDE));
             return;
         }
         let near = || self.ground.clearance_m(&self.state, &self.cg_m()) < NEAR_M;
         if self.strode == 1 && (self.touchdown.is_some() || near()) {
             self.move_near_ground(from_s);
         } else {
-            self.move_by(from_s, over_s, self.strode);
+            self.move_by(from_s, over_s, self.strode.min(STRIDE));
         }
     }
 
@@ -266,7 +277,7 @@ impl World {
             return false;
         }
         let speed_m_s = self.state.velocity_m_s.norm_squared().sqrt();
-        let room_m = NEAR_M + 2.0 * STEP_S * STRIDE as f64 * speed_m_s;
+        let room_m = NEAR_M + 2.0 * STEP_S * LONG_STRIDE as f64 * speed_m_s;
         let cg_m = self.cg_m();
         match &self.stack {
             Some(stack) if stack.on_rail() => speed_m_s == 0.0 && !stack.lights(),
