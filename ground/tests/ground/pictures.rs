@@ -18,7 +18,8 @@ use ground::update::{Msg, Request};
 use ground::view::theme::{Ink, Level, Palette, TextRole, Theme, true_colour};
 use ground::view::{CUT_MARK, footer};
 use protocol::dialect::{
-    MavMessage, TD_FLIGHT_STATUS_DATA, TdBooster, TdCheck, TdChute, TdHold, TdLimit, TdPhase,
+    MavMessage, TD_FLIGHT_STATUS_DATA, TdAbortEffect, TdBooster, TdCheck, TdChute, TdHold, TdInterlock,
+    TdLimit, TdPhase,
 };
 use ratatui::buffer::Buffer;
 use ratatui::style::{Color, Modifier};
@@ -41,7 +42,7 @@ fn no_go() -> Rig {
     let mut rig = with_events();
     rig.checks_failed =
         (TdCheck::TD_CHECK_PIN | TdCheck::TD_CHECK_IGNITER | TdCheck::TD_CHECK_LOG_SPACE).bits();
-    rig.interlocks = protocol::dialect::TdInterlock::empty();
+    rig.interlocks = TdInterlock::empty();
     rig.run(1.0);
     rig
 }
@@ -488,12 +489,15 @@ fn is_ready(moment: &Moment) -> bool {
     phase && moment.status.checks_failed.is_empty() && moment.rig.model.link.uplink.is_proven(moment.rig.now)
 }
 
-/// The pictures of README.md and docs/crew.md: on the pad, in the descent, and after the landing.
-fn moments() -> [(&'static str, Palette, Moment); 3] {
+/// The pictures of the pages from the recorded flight: on the pad, in the descent, in the burn, and
+/// after the landing.
+fn moments() -> [(&'static str, Palette, Moment); 4] {
     let falls = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_AERO_DESCENT && moment.height_m < 220.0;
+    let burns = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_POWERED && moment.height_m < 15.0;
     [
         ("pad-light", Palette::Light, recorded(is_ready)),
         ("descent-dark", Palette::Dark, recorded(falls)),
+        ("burn-dark", Palette::Dark, recorded(burns)),
         ("landed-light", Palette::Light, recorded(|_| false)),
     ]
 }
@@ -508,7 +512,25 @@ fn regress(name: &str, svg: &str) {
     assert!(kept == svg, "{} is out of date; see the head of this file", path.display());
 }
 
-/// The pictures on the pages are what the screen shows at three moments of one recorded flight, at
+/// An abort in the descent: the parachute is open.
+fn aborted() -> Rig {
+    let mut rig = flying(TdPhase::TD_PHASE_AERO_DESCENT);
+    rig.phase = TdPhase::TD_PHASE_CHUTE;
+    rig.interlocks |= TdInterlock::TD_INTERLOCK_ABORT_LATCHED | TdInterlock::TD_INTERLOCK_MOTOR_INHIBITED;
+    rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_NONE;
+    rig.approach_wait_s = u16::MAX;
+    rig.state_in_space([9.0, -2.0, 122.0], [1.5, 2.0, -6.1], (200.0, 3.0));
+    rig.descent_with(122.0, -6.1, TdChute::TD_CHUTE_OPEN);
+    rig.run(1.0);
+    rig
+}
+
+#[test]
+fn regress_the_picture_of_an_abort() {
+    regress("aborted-dark.svg", &picture(&drawn(&aborted(), SIZES[0], Palette::Dark)));
+}
+
+/// The pictures on the pages are what the screen shows at four moments of one recorded flight, at
 /// the height that the vehicle sent.
 #[test]
 fn regress_the_pictures_of_the_pages() {
