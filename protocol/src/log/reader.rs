@@ -212,11 +212,9 @@ impl<R: Read> LogReader<R> {
                     self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes });
                     continue;
                 }
-                Some(Ok(LinearReadEvent::Record { data, opcode })) => {
-                    parse_record(opcode, data).map(McapRecord::into_owned)
-                }
+                Some(Ok(LinearReadEvent::Record { data, opcode })) => parse_record(opcode, data),
             };
-            match parsed {
+            match parsed.map(McapRecord::into_owned) {
                 Ok(McapRecord::Footer(_)) => self.take_end()?,
                 Ok(record) => {
                     if let Some(item) = self.take(record) {

@@ -116,10 +116,9 @@ impl<R: Read> TlogReader<R> {
             let length = frame_length(frame).filter(|_| PLAUSIBLE_US.contains(&time_us));
             match length {
                 Some(length) if frame.len() >= length => {
-                    let is_2 = frame.first() == Some(&MAGIC_2);
                     let bytes = frame.get(..length).unwrap_or_default().to_vec();
                     self.buffer.drain(..TIME_BYTES + length);
-                    if is_2 {
+                    if bytes.first() == Some(&MAGIC_2) {
                         return Ok(Some(TlogFrame { time_us, bytes }));
                     }
                     self.mavlink1 += 1;
@@ -138,8 +137,7 @@ impl<R: Read> TlogReader<R> {
     /// Fills the buffer up to the length of the longest entry, or to the end of the input.
     fn fill(&mut self) -> std::io::Result<()> {
         let missing = (TIME_BYTES + FRAME_MAX_BYTES).saturating_sub(self.buffer.len());
-        let read = self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)?;
-        self.bytes_read += read as u64;
+        self.bytes_read += self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)? as u64;
         Ok(())
     }
 }

@@ -45,9 +45,7 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
 /// Adds the findings of the flight computer, run again, and the work of its solver.
 fn run_again(path: &Path, mut info: Info) -> Info {
     if info.grade.level != GradeLevel::BitExact {
-        if info.findings.is_none() {
-            info.set_findings(Err(info.grade.reason.clone()));
-        }
+        info.set_findings(Err(info.grade.reason.clone()));
         return info;
     }
     let mut work = Vec::new();
@@ -300,10 +298,11 @@ impl Info {
     }
 
     pub(crate) fn set_findings(&mut self, found: Result<Vec<Finding>, String>) {
-        (self.findings, self.not_looked_for) = match found {
-            Ok(findings) => (Some(findings), None),
-            Err(reason) => (None, Some(reason)),
-        };
+        match found {
+            Ok(findings) => self.findings = Some(findings),
+            // Those that the vehicle sent remain.
+            Err(reason) => self.not_looked_for = self.findings.is_none().then_some(reason),
+        }
     }
 }
 
