@@ -116,17 +116,19 @@ impl<R: Read> TlogReader<R> {
             let length = frame_length(frame).filter(|_| PLAUSIBLE_US.contains(&time_us));
             match length {
                 Some(length) if frame.len() >= length => {
-                    let is_2 = frame.first() == Some(&MAGIC_2);
                     let bytes = frame.get(..length).unwrap_or_default().to_vec();
                     self.buffer.drain(..TIME_BYTES + length);
-                    if is_2 {
+                    if bytes.first() == Some(&MAGIC_2) {
                         return Ok(Some(TlogFrame { time_us, bytes }));
                     }
                     self.mavlink1 += 1;
                 }
                 _ => {
-                    self.buffer.drain(..1);
-                    self.garbage_bytes += 1;
+                    // To the next byte that may begin a frame: a file may end in gigabytes of zeros.
+                    let ahead = self.buffer[TIME_BYTES + 1..].iter();
+                    let skipped = ahead.take_while(|byte| ![MAGIC_1, MAGIC_2].contains(byte)).count() + 1;
+                    self.buffer.drain(..skipped);
+                    self.garbage_bytes += skipped as u64;
                 }
             }
         }
@@ -135,8 +137,7 @@ impl<R: Read> TlogReader<R> {
     /// Fills the buffer up to the length of the longest entry, or to the end of the input.
     fn fill(&mut self) -> std::io::Result<()> {
         let missing = (TIME_BYTES + FRAME_MAX_BYTES).saturating_sub(self.buffer.len());
-        let read = self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)?;
-        self.bytes_read += read as u64;
+        self.bytes_read += self.input.by_ref().take(missing as u64).read_to_end(&mut self.buffer)? as u64;
         Ok(())
     }
 }
@@ -207,6 +208,25 @@ mod tests {
         tlog.write(&frame("ground"), 2_000)?;
         tlog.flush()?;
         assert_eq!(bytes, [0, 0, 0, 0, 0, 0x0F, 0x42, 0x42, 0xFD, 1, 2]);
+        Ok(())
+    }
+
+    /// A file that was allocated in advance ends in zeros.
+    #[test]
+    fn zeros_behind_the_frames_are_counted_and_hide_no_frame() -> io::Result<()> {
+        let entry = |time: u8| {
+            let mut entry = vec![0, 0, 0, 0, 0, 0, 0, time, MAGIC_2, 2];
+            entry.resize(8 + 14, 0);
+            entry
+        };
+        let mut bytes = [entry(1), vec![0; 5_000_000], entry(2), vec![0; 100_000]].concat();
+        bytes.push(MAGIC_2);
+        let mut reader = TlogReader::new(bytes.as_slice());
+        let mut times = Vec::new();
+        while let Some(frame) = reader.next_frame()? {
+            times.push(frame.time_us);
+        }
+        assert_eq!((times, reader.garbage_bytes()), (vec![1, 2], 5_100_001));
         Ok(())
     }
 }
