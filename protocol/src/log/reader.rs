@@ -214,7 +214,7 @@ impl<R: Read> LogReader<R> {
                 }
                 Some(Ok(LinearReadEvent::Record { data, opcode })) => parse_record(opcode, data),
             };
-            match parsed {
+            match parsed.map(McapRecord::into_owned) {
                 Ok(McapRecord::Footer(_)) => self.take_end()?,
                 Ok(record) => {
                     if let Some(item) = self.take(record) {
@@ -452,12 +452,12 @@ fn with_causes(error: &mcap::McapError) -> String {
 ///
 /// # Errors
 /// The body does not fit the type.
-pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'static>> {
+pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'_>> {
     // The parser of the crate `mcap` panics if an attachment is too short for its fields.
     if opcode == op::ATTACHMENT && !attachment_fits(data) {
         return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
     }
-    mcap::parse_record(opcode, data).map(McapRecord::into_owned)
+    mcap::parse_record(opcode, data)
 }
 
 /// Calls `keep` for every record of a chunk, from its body, if its checksum is right. It holds one
@@ -468,7 +468,7 @@ pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'sta
 /// have been passed to it by then.
 pub fn records_of_chunk(
     body: &[u8],
-    mut keep: impl FnMut(McapRecord<'static>) -> mcap::McapResult<()>,
+    mut keep: impl FnMut(McapRecord<'_>) -> mcap::McapResult<()>,
 ) -> Result<(), RecordError> {
     let unpacked = unpacked_bytes(body);
     if unpacked > RECORD_LIMIT_BYTES as u64 {

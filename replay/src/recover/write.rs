@@ -164,7 +164,7 @@ impl<'a> Rescue<'a> {
         added.map_err(|source| self.failed(source))
     }
 
-    fn add_record(&mut self, record: Record<'static>) -> mcap::McapResult<()> {
+    fn add_record(&mut self, record: Record<'_>) -> mcap::McapResult<()> {
         match record {
             Record::Schema { header, data } => {
                 let id = self.writer.add_schema(&header.name, &header.encoding, &data)?;
