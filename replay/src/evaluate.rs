@@ -106,7 +106,8 @@ pub fn evaluate(recording: &Recording, settings: &[Setting]) -> Result<EvaluateR
     let count = |differs: &dyn Fn(&Decided, &Decided) -> bool| {
         frames.iter().filter(|frame| differs(&frame.recorded, &frame.evaluated)).count()
     };
-    let bits = |decided: &Decided| decided.gimbal_rad.iter().map(|angle| angle.to_bits()).collect::<Vec<_>>();
+    let bits =
+        |decided: &Decided| [0, 1].map(|axis| decided.gimbal_rad.get(axis).map(|angle| angle.to_bits()));
     let fins_rad = |frame: &EvaluatedFrame| apart_rad(&frame.recorded.fins_rad, &frame.evaluated.fins_rad);
     Ok(EvaluateReport {
         kind: "open loop: the controller alone on recorded inputs",
@@ -197,9 +198,10 @@ impl Answer for EvaluateReport {
         let differing: Vec<&EvaluatedFrame> =
             self.frames.iter().filter(|frame| frame.recorded != frame.evaluated).collect();
         // To the gimbal, to the fins, or by its phase to igniter or parachute.
-        let commands =
-            |decided: &Decided| (decided.gimbal_rad.clone(), decided.fins_rad.clone(), decided.phase);
-        let acts = differing.iter().any(|frame| commands(&frame.recorded) != commands(&frame.evaluated));
+        let acts = differing.iter().any(|EvaluatedFrame { recorded, evaluated, .. }| {
+            let [then, now] = [recorded, evaluated].map(|it| (&it.gimbal_rad, &it.fins_rad, it.phase));
+            then != now
+        });
         if !settings.is_empty() && !acts {
             let what = if differing.is_empty() { "did not act" } else { "changed plans only" };
             lines.push(format!("no command differs: {settings} {what} in this flight"));
