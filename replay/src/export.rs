@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::io::{self, Read};
+use std::io::{self, Read, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::cli::{Answer, give, warn_of_loss};
 use crate::log::FlightLog;
 use crate::output::{NewFile, WriteError, new_folder};
-use crate::table::{Cell, TableReader, TableShape};
+use crate::table::{Cell, DECODED, TableReader, TableShape};
 
 /// A file that was written.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -35,6 +35,7 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
     // It is made with the first table, so that a file that is not a flight log leaves nothing
     // behind.
     let mut folder = None;
+    let mut text = Vec::new();
     let mut open: BTreeMap<usize, (ExportedFile, csv::Writer<NewFile>)> = BTreeMap::new();
     TableReader::default().read::<R, anyhow::Error>(log, |shape, row| {
         let (file, csv) = match open.entry(row.table) {
@@ -48,7 +49,13 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
             }
         };
         file.rows += 1;
-        let written = csv.write_record(row.cells.iter().map(text_of));
+        let mut written = Ok(());
+        for cell in row.cells {
+            text.clear();
+            write_cell(&cell, &mut text)?;
+            written = written.and_then(|()| csv.write_field(&text));
+        }
+        let written = written.and_then(|()| csv.write_record(None::<&[u8]>));
         Ok(written.map_err(io::Error::from).map_err(WriteError::at(&file.path))?)
     })?;
     let finished = open.into_values().map(|(file, csv)| {
@@ -69,12 +76,12 @@ fn create(folder: &Path, shape: &TableShape) -> Result<(ExportedFile, csv::Write
     Ok((ExportedFile { path, rows: 0, columns: shape.columns.len() }, csv))
 }
 
-fn text_of(cell: &Cell) -> String {
+fn write_cell(cell: &Cell, text: &mut Vec<u8>) -> io::Result<()> {
     match cell {
-        Cell::Float(number) => format!("{number:?}"),
-        Cell::Integer(number) => number.to_string(),
-        Cell::Text(text) => text.clone(),
-        Cell::Absent => String::new(),
+        Cell::Float(number) => write!(text, "{number:?}"),
+        Cell::Integer(number) => write!(text, "{number}"),
+        Cell::Text(words) => text.write_all(words.as_bytes()),
+        Cell::Absent => Ok(()),
     }
 }
 
@@ -92,7 +99,7 @@ pub(crate) struct Args {
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
-        let mut log = FlightLog::open(&self.file)?;
+        let mut log = FlightLog::open(&self.file)?.decoding(&DECODED);
         let files = export_tables(&mut log, &self.out)?;
         let outcome = give(&files, self.json)?;
         warn_of_loss(log.name(), log.damage().map(ToString::to_string).as_deref(), None);
@@ -109,6 +116,12 @@ impl Answer for ExportedFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn text_of(cell: &Cell) -> String {
+        let mut text = Vec::new();
+        write_cell(cell, &mut text).unwrap();
+        String::from_utf8(text).unwrap()
+    }
 
     #[test]
     fn numbers_read_back() {

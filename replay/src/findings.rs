@@ -3,13 +3,15 @@
 
 use flight::computer::findings::{Findings, Sign};
 use flight::rules::verdict::UNDER_PARACHUTE;
-use foxglove::messages::log::Level;
+use foxglove::messages::{Log as EventRecord, log::Level};
+use protocol::dialect::TD_FINDING_DATA;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::v1::LimitResult;
+use protocol::text::printable;
 use serde::Serialize;
 
 use crate::controller::LoggedComputer;
-use crate::log::{Clock, ClockTime, Recording, Verdict, worst_first};
+use crate::log::{Clock, ClockTime, Clocks, Recording, Verdict, worst_first};
 
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,6 +37,11 @@ impl Finding {
     }
 }
 
+/// Whether the vehicle warns of something.
+pub(crate) fn is_warning(event: &EventRecord) -> bool {
+    event.name == "vehicle" && event.level >= Level::Warning as i32
+}
+
 /// What the vehicle itself reported before its release, each once; all it reported if it was never
 /// released.
 fn on_the_pad(recording: &Recording) -> Vec<Finding> {
@@ -44,8 +51,7 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
     };
     let mut facts: Vec<Finding> = Vec::new();
     for (log_s, event) in recording.events.iter().filter(|(log_s, _)| *log_s < end_s) {
-        let serious = event.name == "vehicle" && event.level >= Level::Warning as i32;
-        if serious && facts.iter().all(|known| known.words != event.message) {
+        if is_warning(event) && facts.iter().all(|known| known.words != event.message) {
             let words = event.message.clone();
             let since_s = log_s - zero_s;
             let follows = false;
@@ -101,11 +107,11 @@ pub(crate) fn facts(
     recording: &Recording,
     findings: Result<Findings, String>,
 ) -> Result<Vec<Finding>, String> {
+    let mut facts = on_the_pad(recording);
     let findings = match findings {
-        Err(_) if recording.frames.is_empty() && recording.from_power_up => return Ok(on_the_pad(recording)),
+        Err(_) if recording.frames.is_empty() && recording.from_power_up => return Ok(facts),
         findings => findings?,
     };
-    let mut facts = on_the_pad(recording);
     let found = findings.found();
     // A computer that was away measures a late ignition and a weak motor, of any motor.
     let was_away = found.iter().any(|finding| finding.sign == Sign::Restart);
@@ -124,13 +130,31 @@ pub(crate) fn facts(
             picture: picture(finding.sign),
         }
     }));
-    let verdict = recording.verdict.as_ref();
-    if let Some(words) = verdict.and_then(|verdict| broken(verdict, &findings, facts.is_empty())) {
-        let since_s = recording.contact_s().unwrap_or(f64::NAN);
-        let (clock, follows) = (Clock::Flight, !facts.is_empty());
-        facts.push(Finding { since_s, clock, lasted_s: 0.0, words, follows, picture: "limits" });
+    if let Some(verdict) = &recording.verdict {
+        let contact_s = recording.contact_s().unwrap_or(f64::NAN);
+        facts.extend(broken(verdict, contact_s, findings.thrust_over_weight_at_contact(), &facts));
     }
     Ok(facts)
+}
+
+/// The findings of a landing without warnings that broke no limit, whose vehicle has sent none or
+/// one after its contact: `last` was sent last. Only a computer that is run again separates causes
+/// from consequences, and has the thrust at a contact.
+pub(crate) fn recorded(last: &TD_FINDING_DATA, verdict: &Verdict, clocks: &Clocks) -> Option<Vec<Finding>> {
+    let contact_s = clocks.convert(verdict.contact(), Clock::Boot)?.time_s;
+    if last.found > 1 || f64::from(last.time_boot_ms) / 1e3 < contact_s {
+        return None;
+    }
+    let to_ms = |time_s: f32| (f64::from(time_s) * 1e3).round() / 1e3;
+    let found = (last.found == 1).then(|| Finding {
+        since_s: to_ms(last.since_s),
+        clock: Clock::Flight,
+        lasted_s: to_ms(last.held_s),
+        words: printable(last.text[..].split(|byte| *byte == 0).next().unwrap_or_default()),
+        follows: false,
+        picture: "",
+    });
+    broken(verdict, contact_s, None, &[]).is_none().then(|| found.into_iter().collect())
 }
 
 /// The pictures of the fins.
@@ -160,9 +184,14 @@ fn picture(sign: Sign) -> &'static str {
     }
 }
 
-/// How the landing failed, the limits that it broke, the worst first, and the remaining thrust;
-/// `None` if it kept all, and of a vehicle that came down under its parachute.
-fn broken(verdict: &Verdict, findings: &Findings, nothing_else: bool) -> Option<String> {
+/// How the landing failed, the limits that it broke, the worst first, and the remaining thrust over
+/// the weight; `None` if it kept all, and of a vehicle that came down under its parachute.
+fn broken(
+    verdict: &Verdict,
+    contact_s: f64,
+    thrust_over_weight: Option<f64>,
+    before: &[Finding],
+) -> Option<Finding> {
     // A body strike or a fall is no quantity: its limit has no width.
     let has_width = |limit: &&LimitResult| limit.maximum > limit.minimum;
     let failure = verdict.deciding().find(|limit| !limit.passed && !has_width(limit));
@@ -182,10 +211,17 @@ fn broken(verdict: &Verdict, findings: &Findings, nothing_else: bool) -> Option<
     if words.is_empty() {
         return None;
     }
-    words.extend((words.len() == 1 && nothing_else).then(|| "nothing else wrong".to_owned()));
-    let ratio = findings.thrust_over_weight_at_contact();
-    words.extend(ratio.map(|ratio| format!("the thrust was {ratio:.2} of the weight")));
-    Some(words.join("; "))
+    words.extend((words.len() == 1 && before.is_empty()).then(|| "nothing else wrong".to_owned()));
+    words.extend(thrust_over_weight.map(|ratio| format!("the thrust was {ratio:.2} of the weight")));
+    let (words, follows) = (words.join("; "), !before.is_empty());
+    Some(Finding {
+        since_s: contact_s,
+        clock: Clock::Flight,
+        lasted_s: 0.0,
+        words,
+        follows,
+        picture: "limits",
+    })
 }
 
 /// How far beyond its limit a value is.

@@ -21,7 +21,7 @@ use serde::Serialize;
 use sim::wire::record::text_event;
 
 use crate::cli::{Answer, ending, print_note};
-use crate::refly::write_records;
+use crate::log::write_records;
 
 /// A log that was written.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -10,6 +10,11 @@ pub(crate) fn counted(count: u64, noun: &str) -> String {
     if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
+/// Loss of messages, as every command reports it.
+pub(crate) fn messages_lost(count: u64) -> String {
+    format!("{} lost", counted(count, "message"))
+}
+
 /// The most similar name.
 pub(crate) fn nearest<'a>(given: &str, names: impl Iterator<Item = &'a String>) -> String {
     let likeness = |name: &str| strsim::jaro_winkler(given, name);

@@ -26,7 +26,7 @@ pub use sets::{FlightSet, Flip, SetComparison, compare_sets};
 
 use crate::cli::{give, warn_of_loss};
 use crate::log::Verdict;
-use crate::print::{counted, word};
+use crate::print::{counted, messages_lost, word};
 
 /// One flight against another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -133,7 +133,7 @@ fn lost_samples([ours, theirs]: [&BTreeMap<String, Series>; 2], shift_s: f64) ->
 /// Parts of the flights that were not compared because of damage or a missing end.
 fn incomplete(flights: [&Flown; 2]) -> Vec<String> {
     let mut failures = Vec::new();
-    for Flown { name, damage, cut, out_of_order, .. } in flights {
+    for Flown { name, damage, cut, messages_lost: lost, out_of_order, .. } in flights {
         if *out_of_order > 0 {
             failures.push(format!("{name}: {out_of_order} numbers are out of order and were not compared"));
         }
@@ -141,6 +141,7 @@ fn incomplete(flights: [&Flown; 2]) -> Vec<String> {
         failures.extend(
             damage.map(|damage| format!("{name} is damaged: {damage}; nothing after that was compared")),
         );
+        failures.extend((*lost > 0).then(|| format!("{name}: {}", messages_lost(*lost))));
         failures.extend(cut.as_ref().map(|cut| format!("{name} is of an INCOMPLETE flight: it {cut}")));
     }
     failures.dedup();

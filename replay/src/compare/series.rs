@@ -7,13 +7,10 @@ use flight::rules::phase::Phase;
 use serde::Serialize;
 
 use crate::log::{Cut, FlightLog, RecordingError, Verdict};
-use crate::table::{Cell, Column, FLIGHT_TIME_S, Kind, TableReader};
+use crate::table::{Cell, Column, DECODED, FLIGHT_TIME_S, Kind, TableReader, TableShape};
 
 /// Limit on the numbers held for one log; a flight of some minutes has a few hundred thousand.
 const VALUES_MAX: usize = 20_000_000;
-
-/// Begins the names of the tables of MAVLink messages.
-const MESSAGES: &str = "mavlink_";
 
 /// Columns that are not signals: times, record numbers, and durations measured on the wall clock.
 const NO_SIGNALS: [&str; 9] = [
@@ -78,6 +75,8 @@ pub struct Flown {
     pub damage: Option<String>,
     /// Where the record ends, if that is before the end of the flight.
     pub cut: Option<Cut>,
+    /// Records that are missing, by their numbers.
+    pub messages_lost: u64,
     /// Number of values left out because their times are earlier than the time before them.
     pub out_of_order: usize,
 }
@@ -89,37 +88,29 @@ impl Flown {
     /// The file is not a flight log, cannot be read, holds several flights or is longer than any
     /// flight.
     pub fn open(path: &Path) -> Result<Self, RecordingError> {
-        let mut log = FlightLog::open(path)?;
+        let mut log = FlightLog::open(path)?.decoding(&DECODED);
         let name = log.name().to_owned();
         let mut first_ns = None;
-        // By table and column; `None` of a column that is no signal.
-        let mut read: Vec<Vec<Option<Series>>> = Vec::new();
+        let mut read: Vec<Option<Signals>> = Vec::new();
         let (mut held, mut out_of_order) = (0_usize, 0_usize);
-        let mut reader = TableReader::default();
+        let mut reader = TableReader::without_messages();
         reader.read::<_, RecordingError>(&mut log, |shape, row| {
             let log_ns = row.cells.first().and_then(Cell::number).unwrap_or(0.0);
             let since_s = (log_ns - *first_ns.get_or_insert(log_ns)) / 1e9;
-            if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) || shape.name.starts_with(MESSAGES) {
+            if NO_SIGNAL_TABLES.contains(&shape.name.as_str()) {
                 return Ok(());
             }
-            let number = |column: &str| Some(row.cells.get(shape.place_of(column)?)?.number());
-            // Outside the flight a frame has no time in it.
-            let time_s = number(FLIGHT_TIME_S).unwrap_or_else(|| {
-                let recorded_s = number("time_s").flatten().filter(|time_s| time_s.is_finite());
-                recorded_s.or(Some(since_s))
-            });
+            read.resize_with(read.len().max(row.table + 1), || None);
+            let Signals { times, columns } = read[row.table].get_or_insert_with(|| Signals::of(shape));
+            let number = |column: usize| row.cells.get(column)?.number();
+            let time_s = match *times {
+                // Outside the flight a frame has no time in it.
+                [Some(flight_time), _] => number(flight_time),
+                [None, time] => {
+                    time.and_then(number).filter(|time_s: &f64| time_s.is_finite()).or(Some(since_s))
+                }
+            };
             let Some(time_s) = time_s else { return Ok(()) };
-            read.resize_with(read.len().max(row.table + 1), Vec::new);
-            let columns = &mut read[row.table];
-            if columns.is_empty() {
-                let series = |column: &Column| Series {
-                    is_integer: column.kind == Kind::Integer,
-                    ..Series::default()
-                };
-                columns.extend(
-                    shape.columns.iter().map(|column| is_signal(&column.name).then(|| series(column))),
-                );
-            }
             for (series, cell) in columns.iter_mut().zip(&row.cells) {
                 let (Some(series), Some(value)) = (series, cell.number()) else { continue };
                 // A signal needs ascending times, so records out of order are left out and counted.
@@ -138,7 +129,7 @@ impl Flown {
         let mut signals = BTreeMap::<String, Series>::new();
         // The limits and times of a verdict stand beside the signals.
         for (shape, columns) in reader.shapes.iter().zip(read).filter(|(shape, _)| shape.name != "verdict") {
-            for (column, series) in shape.columns.iter().zip(columns) {
+            for (column, series) in shape.columns.iter().zip(columns.into_iter().flat_map(|it| it.columns)) {
                 let series = series.filter(|series| !series.values.is_empty());
                 signals.extend(series.map(|series| (format!("{}.{}", shape.name, column.name), series)));
             }
@@ -156,13 +147,30 @@ impl Flown {
             verdict: log.verdict(),
             damage: log.damage().map(ToString::to_string),
             cut: log.flights.cut(),
+            messages_lost: log.messages_lost(),
             out_of_order,
         })
     }
 }
 
-fn is_signal(column: &str) -> bool {
-    !NO_SIGNALS.contains(&column) && !NO_SIGNALS_OF.iter().any(|beginning| column.starts_with(beginning))
+/// The signals of a table while its rows are read.
+struct Signals {
+    /// The columns with the time of a frame since the release, and of another record.
+    times: [Option<usize>; 2],
+    /// `None` of a column that is no signal.
+    columns: Vec<Option<Series>>,
+}
+
+impl Signals {
+    fn of(shape: &TableShape) -> Self {
+        let series = |Column { name, kind }: &Column| {
+            let is_signal = !NO_SIGNALS.contains(&name.as_str())
+                && !NO_SIGNALS_OF.iter().any(|beginning| name.starts_with(beginning));
+            is_signal.then(|| Series { is_integer: *kind == Kind::Integer, ..Series::default() })
+        };
+        let times = [FLIGHT_TIME_S, "time_s"].map(|name| shape.place_of(name));
+        Self { times, columns: shape.columns.iter().map(series).collect() }
+    }
 }
 
 /// The event on which the flights are aligned.

@@ -2,6 +2,7 @@
 //! outcome of the flight.
 
 use std::collections::BTreeMap;
+use std::io::Read;
 
 use avionics::log::frame::accepts_abort;
 use flight::rules::phase::Phase;
@@ -12,7 +13,7 @@ use protocol::log::reader::LogChannel;
 use serde::Serialize;
 
 use super::{Grade, GradeLevel, Profile};
-use crate::log::{Entry, FrameOrder, Gap, StampedEntry, Verdict};
+use crate::log::{Entry, FlightLog, FrameOrder, Gap, StampedEntry, Verdict};
 
 /// A channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -41,7 +42,6 @@ pub(super) struct ChannelCounter {
 struct Counts {
     messages: u64,
     unreadable: u64,
-    last_sequence: u32,
 }
 
 impl ChannelCounter {
@@ -49,21 +49,13 @@ impl ChannelCounter {
         let counts = self.counts.entry(stamped.channel_id).or_default();
         counts.messages += 1;
         counts.unreadable += u64::from(matches!(stamped.entry, Entry::Unreadable { .. }));
-        counts.last_sequence = counts.last_sequence.max(stamped.sequence);
     }
 
-    pub(super) fn into_facts<'a>(
-        mut self,
-        channels: impl Iterator<Item = (u16, &'a LogChannel)>,
-        share_a_counter: bool,
-    ) -> Vec<Channel> {
+    pub(super) fn into_facts<R: Read>(mut self, log: &FlightLog<R>) -> Vec<Channel> {
         // A program that joined logs has given each part channels of its own.
         let mut facts: BTreeMap<_, Channel> = BTreeMap::new();
-        for (id, LogChannel { topic, message_encoding, schema_name, metadata, .. }) in channels {
+        for (id, LogChannel { topic, message_encoding, schema_name, metadata, .. }) in log.channels() {
             let counts = self.counts.remove(&id).unwrap_or_default();
-            // Sequence numbers start at 0; a writer without numbering leaves 0 everywhere.
-            let unnumbered = counts.last_sequence == 0 || share_a_counter;
-            let numbered = if unnumbered { 0 } else { u64::from(counts.last_sequence) + 1 };
             let fact = facts.entry((topic, metadata)).or_insert_with(|| Channel {
                 topic: topic.clone(),
                 message_encoding: message_encoding.clone(),
@@ -71,15 +63,12 @@ impl ChannelCounter {
                 metadata: metadata.clone(),
                 messages: 0,
                 unreadable: 0,
-                lost: 0,
+                lost: log.lost_of(id),
             });
             fact.messages += counts.messages;
             fact.unreadable += counts.unreadable;
-            // Those that there should be, so far.
-            fact.lost = fact.lost.max(numbered);
         }
-        let lost = |fact: Channel| Channel { lost: fact.lost.saturating_sub(fact.messages), ..fact };
-        facts.into_values().map(lost).collect()
+        facts.into_values().collect()
     }
 }
 

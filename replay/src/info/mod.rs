@@ -13,6 +13,8 @@ use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::from_toml;
+use mavlink::MessageData as _;
+use protocol::dialect::{MavMessage, TD_FINDING_DATA};
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
@@ -25,24 +27,29 @@ use crate::controller::new_plan;
 use crate::findings::{self, Finding};
 use crate::log::{
     Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, Jump, LogError, Recording,
-    StampedEntry, Verdict,
+    RecordingError, RecordingReader, StampedEntry, Verdict, frame_of,
 };
-use crate::print::{beyond, counted};
+use crate::print::{beyond, counted, messages_lost};
 use crate::recover::scan::Records;
 
-/// Describes a log file.
+/// Describes a log file. The flight computer is run again only if the vehicle's own findings do not
+/// suffice.
 ///
 /// # Errors
 /// The file is not a flight log or cannot be read. Damage is part of the description, not an error.
 pub fn info(path: &Path) -> Result<Info, LogError> {
-    let mut info = described(path)?;
+    let info = described(path)?;
+    Ok(if info.findings.is_some() { info } else { run_again(path, info) })
+}
+
+/// Adds the findings of the flight computer, run again, and the work of its solver.
+fn run_again(path: &Path, mut info: Info) -> Info {
     if info.grade.level != GradeLevel::BitExact {
         info.set_findings(Err(info.grade.reason.clone()));
-        return Ok(info);
+        return info;
     }
     let mut work = Vec::new();
-    let recording = Recording::open_from_power_up(path).map_err(|error| error.to_string());
-    let found = recording.and_then(|recording| {
+    let found = recorded(path).map_err(|error| error.to_string()).and_then(|(_, recording)| {
         let again = findings::run_again(&recording, |computer, _, frame| {
             let plan = new_plan(computer.pilot(), &frame.output);
             work.extend(plan.map(|_| computer.pilot().report().iterations as f64));
@@ -53,16 +60,31 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
         frames.solver_work = SolverWork::of(work);
     }
     info.set_findings(found);
-    Ok(info)
+    info
 }
 
-/// The same without the findings, for who holds the recording to look for them.
+/// The same with the vehicle's own findings alone.
 pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut info = info_of(&mut log)?;
-    info.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
-    info.completeness.checksummed = Some(Records::open(path)?.is_checksummed()?);
+    info.note_file(path)?;
     Ok(info)
+}
+
+/// The same with the recording of the flight, whose computer was run up to its release.
+///
+/// # Errors
+/// As [`Recording::open`].
+pub(crate) fn recorded(path: &Path) -> Result<(Info, Recording), RecordingError> {
+    let mut log = FlightLog::open(path)?;
+    let (mut seen, mut reader) = (Seen::default(), RecordingReader::of(&log, true));
+    while let Some(stamped) = log.next_entry()? {
+        seen.take(&stamped, &log);
+        reader.take(stamped, &log)?;
+    }
+    let mut info = seen.into_info(&log);
+    info.note_file(path)?;
+    Ok((info, reader.finish(&log)?))
 }
 
 /// Describes a log that is being read.
@@ -72,15 +94,15 @@ pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
 pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
     let mut seen = Seen::default();
     while let Some(stamped) = log.next_entry()? {
-        let flights = log.flights.found.len();
-        if flights > seen.flights {
-            // The last verdict is shown: phases and outcome are of the same flight.
-            seen.vehicle_phases = PhaseTracker::default();
-            (seen.ending, seen.flights) = (EndingTracker::default(), flights);
-        }
-        seen.take(&stamped, &log.clocks);
+        seen.take(&stamped, log);
     }
     Ok(seen.into_info(log))
+}
+
+/// Whether a raw frame holds TD_FINDING, by its header.
+fn is_finding(frame: &[u8]) -> bool {
+    let id = TD_FINDING_DATA::ID.to_le_bytes();
+    frame.first() == Some(&mavlink::MAV_STX_V2) && frame.get(7..10) == Some(&id[..3])
 }
 
 /// What was seen while the log was read.
@@ -95,10 +117,20 @@ struct Seen {
     frames: FrameCounter,
     highest_m: Option<f64>,
     unreadable: Option<String>,
+    /// The vehicle has warned of something before its release.
+    warned: bool,
+    /// The finding that the vehicle has sent last.
+    finding: Option<TD_FINDING_DATA>,
 }
 
 impl Seen {
-    fn take(&mut self, stamped: &StampedEntry, clocks: &Clocks) {
+    fn take<R: Read>(&mut self, stamped: &StampedEntry, log: &FlightLog<R>) {
+        let flights = log.flights.found.len();
+        if flights > self.flights {
+            // The last verdict is shown: phases and outcome are of the same flight.
+            (self.vehicle_phases, self.finding) = (PhaseTracker::default(), None);
+            (self.ending, self.flights) = (EndingTracker::default(), flights);
+        }
         self.channels.count(stamped);
         let at_ns = stamped.log_time_ns;
         let (first_ns, last_ns) = self.span.unwrap_or((at_ns, at_ns));
@@ -107,7 +139,7 @@ impl Seen {
         match &stamped.entry {
             Entry::Telemetry(telemetry) => {
                 if let Some(phase) = telemetry.phase {
-                    let jumped_s = clocks.station_jump.map_or(0.0, |jump| jump.by_s);
+                    let jumped_s = log.clocks.station_jump.map_or(0.0, |jump| jump.by_s);
                     self.telemetry_phases.note(telemetry.time_s - jumped_s, phase);
                 }
                 self.rises_to(telemetry.altitude_m);
@@ -115,6 +147,15 @@ impl Seen {
             Entry::Estimate(estimate) => self.rises_to(Some(estimate.state.position_m.z)),
             Entry::Unreadable { reason } => {
                 self.unreadable.get_or_insert_with(|| reason.clone());
+            }
+            Entry::Event(event) if log.clocks.flight_zero_s.is_none() => {
+                self.warned |= findings::is_warning(event);
+            }
+            Entry::RawFrame if is_finding(&stamped.data) => {
+                let message = frame_of(&stamped.data).and_then(|frame| frame.decode().ok());
+                if let Some(MavMessage::TD_FINDING(finding)) = message {
+                    self.finding = Some(finding);
+                }
             }
             Entry::ComputerStart(_) => self.frames.start = true,
             Entry::PilotTiming(timing) => self.frames.time(timing),
@@ -145,8 +186,10 @@ impl Seen {
             last_ns,
             duration_s: last_ns.saturating_sub(first_ns) as f64 / 1e9,
         });
-        let channels = self.channels.into_facts(log.channels(), log.missing_of_all().is_some());
+        let channels = self.channels.into_facts(log);
         let verdict = log.verdict();
+        let sent = self.finding.filter(|_| !self.warned).zip(verdict.as_ref());
+        let findings = sent.and_then(|(last, verdict)| findings::recorded(&last, verdict, &log.clocks));
         let ending = self.ending.words(verdict.as_ref());
         let resets = self.vehicle_phases.resets;
         let after_reset = |ending| match resets {
@@ -172,7 +215,7 @@ impl Seen {
             build_comparison: head.compare_build(),
             run: head.run.clone(),
             profile,
-            completeness: Completeness::of(log, span.as_ref(), &channels),
+            completeness: Completeness::of(log, span.as_ref()),
             span,
             channels,
             phases: timelines
@@ -182,7 +225,7 @@ impl Seen {
             ending: ending.map(after_reset),
             verdict,
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
-            findings: None,
+            findings,
             not_looked_for: None,
             clocks: log.clocks,
             unreadable: self.unreadable,
@@ -248,11 +291,18 @@ impl Info {
         }
     }
 
+    fn note_file(&mut self, path: &Path) -> Result<(), LogError> {
+        self.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
+        self.completeness.checksummed = Some(Records::open(path)?.is_checksummed()?);
+        Ok(())
+    }
+
     pub(crate) fn set_findings(&mut self, found: Result<Vec<Finding>, String>) {
-        (self.findings, self.not_looked_for) = match found {
-            Ok(findings) => (Some(findings), None),
-            Err(reason) => (None, Some(reason)),
-        };
+        match found {
+            Ok(findings) => self.findings = Some(findings),
+            // Those that the vehicle sent remain.
+            Err(reason) => self.not_looked_for = self.findings.is_none().then_some(reason),
+        }
     }
 }
 
@@ -374,10 +424,8 @@ impl Completeness {
         warn_of_loss(name, self.damage.as_deref(), self.cut.as_ref());
     }
 
-    fn of<R: Read>(log: &FlightLog<R>, span: Option<&Span>, channels: &[Channel]) -> Self {
-        let (damage, cut) = (log.damage(), log.flights.cut());
-        let missing = u64::from(log.missing_of_all().unwrap_or(0));
-        let messages_lost = missing + channels.iter().map(|channel| channel.lost).sum::<u64>();
+    fn of<R: Read>(log: &FlightLog<R>, span: Option<&Span>) -> Self {
+        let (damage, cut, messages_lost) = (log.damage(), log.flights.cut(), log.messages_lost());
         Self {
             complete: damage.is_none() && messages_lost == 0 && cut.is_none(),
             damage: damage.map(ToString::to_string),
@@ -458,7 +506,7 @@ impl Info {
                 }));
             }
         }
-        if self.grade.level != GradeLevel::BitExact {
+        if self.grade.level != GradeLevel::BitExact && self.findings.is_none() {
             return rows;
         }
         let words = |found: &Finding| format!("{:.2} {}", found.since(), found.words);
@@ -494,7 +542,7 @@ impl Info {
             });
         }
         if found.messages_lost > 0 {
-            faults.push(format!("{} lost", counted(found.messages_lost, "message")));
+            faults.push(messages_lost(found.messages_lost));
         }
         faults.extend(found.cut.as_ref().map(|cut| format!("the flight {cut}")));
         format!("NO: {}", faults.join("; "))
@@ -635,6 +683,10 @@ pub(crate) struct Args {
     /// Print the table of a folder as CSV.
     #[arg(long, conflicts_with = "json")]
     csv: bool,
+    /// Run the flight computer again even if the findings of the vehicle suffice: adds the work of
+    /// its solver.
+    #[arg(long)]
+    again: bool,
 }
 
 impl Args {
@@ -657,7 +709,10 @@ impl Args {
         // On a terminal the description contains it already.
         let said = !self.json && std::io::stdout().is_terminal();
         give_each(&self.files, self.json, |file| {
-            let info = description(file)?;
+            let mut info = description(file)?;
+            if self.again && info.size_bytes.is_some() {
+                info = run_again(file, info);
+            }
             if !said {
                 info.completeness.warn(&info.file);
             }

@@ -219,31 +219,65 @@ impl Flights {
 /// Sequence numbers of records, which show losses. MCAP leaves them to the writer: each channel has
 /// its counter, or all share one, or every number is 0.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Sequences {
-    /// By channel: the next number, and how many records of all channels were missing by then.
-    channels: BTreeMap<u16, (u32, u32)>,
+pub(crate) struct Sequences {
+    channels: BTreeMap<u16, Numbers>,
     last: Option<u32>,
     each_has_its_counter: bool,
     /// Records that are missing, if all share a counter.
     missing: u32,
 }
 
+/// The numbers of a channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Numbers {
+    next: u32,
+    /// Records of all channels that were missing by then.
+    missing: u32,
+    highest: u32,
+    records: u64,
+}
+
 impl Sequences {
     /// Takes a record of a channel; returns how many records are missing since the last one of the
     /// channel: of it, or of all that share the counter.
-    pub(super) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
+    pub(crate) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
         self.each_has_its_counter |= self.last.is_some_and(|last| sequence <= last);
         let of_all = self.last.map_or(0, |last| last.saturating_add(1));
         self.missing = self.missing.saturating_add(sequence.saturating_sub(of_all));
         self.last = Some(sequence);
-        let now = (sequence.saturating_add(1), self.missing);
-        let (of_channel, missing) = self.channels.insert(channel, now).unwrap_or_default();
-        if self.each_has_its_counter { sequence.saturating_sub(of_channel) } else { self.missing - missing }
+        let numbers = self.channels.entry(channel).or_default();
+        let before = *numbers;
+        *numbers = Numbers {
+            next: sequence.saturating_add(1),
+            missing: self.missing,
+            highest: before.highest.max(sequence),
+            records: before.records + 1,
+        };
+        if self.each_has_its_counter {
+            sequence.saturating_sub(before.next)
+        } else {
+            self.missing - before.missing
+        }
     }
 
-    /// The number of missing records, if all channels share a counter.
-    pub(super) fn missing_of_all(&self) -> Option<u32> {
-        (!self.each_has_its_counter && self.channels.len() > 1).then_some(self.missing)
+    /// The number of missing records of a channel that has its counter.
+    pub(crate) fn lost_of(&self, channel: u16) -> u64 {
+        let Numbers { highest, records, .. } = self.channels.get(&channel).copied().unwrap_or_default();
+        // A writer without numbering leaves 0 everywhere.
+        let numbered = if highest == 0 || self.is_shared() { 0 } else { u64::from(highest) + 1 };
+        numbered.saturating_sub(records)
+    }
+
+    /// The number of missing records.
+    pub(crate) fn lost(&self) -> u64 {
+        if self.is_shared() {
+            return self.missing.into();
+        }
+        self.channels.keys().map(|channel| self.lost_of(*channel)).sum()
+    }
+
+    fn is_shared(&self) -> bool {
+        !self.each_has_its_counter && self.channels.len() > 1
     }
 }
 
@@ -304,12 +338,12 @@ mod tests {
             let mut sequences = Sequences::default();
             let lost: Vec<u32> =
                 records.iter().map(|(channel, number)| sequences.note(*channel, *number)).collect();
-            (lost, sequences.missing_of_all())
+            (lost, sequences.lost())
         };
-        assert_eq!(lost(&[(1, 0), (2, 0), (1, 1), (2, 1), (1, 3)]), (vec![0, 0, 0, 0, 1], None));
-        assert_eq!(lost(&[(1, 0), (2, 1), (2, 3), (1, 4), (2, 5)]), (vec![0, 0, 1, 1, 0], Some(1)));
-        assert_eq!(lost(&[(1, 0), (2, 0), (1, 0)]), (vec![0, 0, 0], None));
-        assert_eq!(lost(&[(1, 7), (1, 8)]), (vec![7, 0], None));
+        assert_eq!(lost(&[(1, 0), (2, 0), (1, 1), (2, 1), (1, 3)]), (vec![0, 0, 0, 0, 1], 1));
+        assert_eq!(lost(&[(1, 0), (2, 1), (2, 3), (1, 4), (2, 5)]), (vec![0, 0, 1, 1, 0], 1));
+        assert_eq!(lost(&[(1, 0), (2, 0), (1, 0)]), (vec![0, 0, 0], 0));
+        assert_eq!(lost(&[(1, 7), (1, 8)]), (vec![7, 0], 7));
     }
 
     #[test]

@@ -10,26 +10,33 @@ mod record;
 mod recording;
 mod verdict;
 
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Chain, Cursor, Read};
-use std::path::Path;
+use std::io::{self, BufReader, BufWriter, Chain, Cursor, Read, Write as _};
+use std::path::{Path, PathBuf};
 
 pub use clocks::{Clock, ClockTime, Clocks, Jump, Moment};
+use flights::InFlight;
+pub(crate) use flights::Sequences;
 pub use flights::{Cut, Flights, FrameOrder, Gap, LoggedFlight};
-use flights::{InFlight, Sequences};
 pub(crate) use head::differing;
 pub use head::{Attachment, BuildComparison, BuildDifference, Head};
 use protocol::log::reader::{Damage, LogChannel, LogItem, LogReader};
 use protocol::log::record::{
-    TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_RAW_RX, TOPIC_TELEMETRY, TOPIC_VERDICT,
+    Record, TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_ESTIMATE, TOPIC_RAW_RX, TOPIC_TELEMETRY,
+    TOPIC_VERDICT,
 };
+use protocol::log::writer::{LogHeader, LogWriter};
 use protocol::text::printable;
 pub use record::{Entry, LoggedFrame, StampedEntry};
 pub(crate) use record::{RECORD_MAX_BYTES, frame_descriptor, misread_frame};
+pub(crate) use recording::RecordingReader;
 pub use recording::{Recording, RecordingError};
 pub use verdict::{Verdict, share, worst_first};
 use verdict::{Verdicts, contradiction, received_message};
 pub(crate) use verdict::{frame_of, is_received};
+
+use crate::output::{NewFile, WriteError};
 
 /// First bytes of every MCAP file.
 const MCAP_MAGIC: [u8; 8] = [0x89, b'M', b'C', b'A', b'P', b'0', b'\r', b'\n'];
@@ -103,6 +110,8 @@ pub struct FlightLog<R: Read> {
     order: ComputerOrder,
     in_flight: InFlight,
     sequences: Sequences,
+    /// The channel with the lowest number that has the topic and metadata of each.
+    same: BTreeMap<u16, u16>,
     /// The first verdict that contradicts itself.
     contradiction: Option<Damage>,
     /// The topics whose records are decoded; all, if `None`.
@@ -164,6 +173,7 @@ impl<R: Read> FlightLog<R> {
             order: ComputerOrder::default(),
             in_flight: InFlight::default(),
             sequences: Sequences::default(),
+            same: BTreeMap::new(),
             contradiction: None,
             wanted: None,
         })
@@ -210,9 +220,14 @@ impl<R: Read> FlightLog<R> {
         self.reader.is_counted()
     }
 
-    /// The number of missing records, if all channels so far share one sequence counter.
-    pub(crate) fn missing_of_all(&self) -> Option<u32> {
-        self.sequences.missing_of_all()
+    /// The number of missing records, by the sequence numbers.
+    pub fn messages_lost(&self) -> u64 {
+        self.sequences.lost()
+    }
+
+    /// The number of missing records of a channel.
+    pub(crate) fn lost_of(&self, channel: u16) -> u64 {
+        self.sequences.lost_of(channel)
     }
 
     /// Its landing verdict, recorded or received, as far as it was read.
@@ -266,7 +281,16 @@ impl<R: Read> FlightLog<R> {
                     self.in_flight.place(&mut entry);
                     self.last_log_time_ns = self.last_log_time_ns.max(Some(log_time_ns));
                     self.first_log_time_ns.get_or_insert(log_time_ns);
-                    let lost_before = self.sequences.note(channel_id, sequence);
+                    // A program that joined logs has given each part channels of its own.
+                    let first = *self.same.entry(channel_id).or_insert_with(|| {
+                        let is_same = |(_, other): &(u16, &LogChannel)| {
+                            channel.is_some_and(|it| {
+                                (&it.topic, &it.metadata) == (&other.topic, &other.metadata)
+                            })
+                        };
+                        self.reader.channels().find(is_same).map_or(channel_id, |(first, _)| first)
+                    });
+                    let lost_before = self.sequences.note(first, sequence);
                     let stamped =
                         StampedEntry { channel_id, log_time_ns, sequence, lost_before, data, entry };
                     let message = received_message(self.reader.channel(channel_id), &stamped);
@@ -294,6 +318,24 @@ impl<R: Read> FlightLog<R> {
         let topics = self.reader.channels().map(|(_, channel)| channel.topic.clone()).collect();
         Err(LogError::Foreign { name: self.name.clone(), library: self.head.library.clone(), topics })
     }
+}
+
+/// Writes records with their times since the start, s, as a log.
+///
+/// # Errors
+/// The file cannot be created or written.
+pub(crate) fn write_records(
+    output: &Path,
+    header: &LogHeader,
+    records: &[(f64, Record)],
+) -> Result<PathBuf, WriteError> {
+    NewFile::create(output)?.fill(|file| {
+        let mut log = LogWriter::new(BufWriter::new(file), header).map_err(io::Error::other)?;
+        for (time_s, record) in records {
+            log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
+        }
+        log.finish().map_err(io::Error::other)?.flush()
+    })
 }
 
 /// Most topics of a foreign file listed in a message.

@@ -3,6 +3,7 @@
 //! Plans and raw frames are left out, so a flight of some minutes takes some tens of megabytes. A
 //! log that is longer than any real flight is refused.
 
+use std::io::Read;
 use std::path::Path;
 
 use avionics::log::logged::RecordError;
@@ -13,7 +14,7 @@ use protocol::log::{flight_v1, v1};
 
 use crate::controller::LoggedComputer;
 
-use super::{Clock, Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, Verdict};
+use super::{Clock, Clocks, Cut, Entry, FlightLog, FrameOrder, Gap, Head, LogError, StampedEntry, Verdict};
 
 /// Most records of one kind: seventeen minutes of frames at 200 Hz.
 const RECORDS_MAX: usize = 200_000;
@@ -79,7 +80,7 @@ pub struct Recording {
     /// from power-up and is the one that people read.
     pub release_frame: u64,
     /// The computer at its release, run from its power-up on; see
-    /// [`open_from_power_up`](Self::open_from_power_up).
+    /// [`RecordingReader::of`].
     pub(crate) at_release: Option<Box<LoggedComputer>>,
     /// Number of frames before the first lost one.
     pub frames_unbroken: usize,
@@ -117,90 +118,16 @@ impl Recording {
         Self::read(&mut FlightLog::open(path)?)
     }
 
-    /// Reads a log file, and runs its computer from its power-up to its release: a computer that is
-    /// built at its release lacks what the pad left in the memory of the recorded one.
-    ///
-    /// # Errors
-    /// As [`open`](Self::open).
-    pub(crate) fn open_from_power_up(path: &Path) -> Result<Self, RecordingError> {
-        Self::read_with(&mut FlightLog::open(path)?, true)
-    }
-
     /// Reads a log to its end.
     ///
     /// # Errors
     /// As [`open`](Self::open).
-    pub fn read<R: std::io::Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
-        Self::read_with(log, false)
-    }
-
-    fn read_with<R: std::io::Read>(
-        log: &mut FlightLog<R>,
-        runs_the_pad: bool,
-    ) -> Result<Self, RecordingError> {
-        let mut recording = Self { name: log.name().to_owned(), ..Self::default() };
-        let (mut frame_order, mut frames_lost) = (FrameOrder::default(), None);
+    pub fn read<R: Read>(log: &mut FlightLog<R>) -> Result<Self, RecordingError> {
+        let mut reader = RecordingReader::of(log, false);
         while let Some(stamped) = log.next_entry()? {
-            match stamped.entry {
-                Entry::PilotTiming(timing) => recording.timings.push(*timing),
-                Entry::World(sample) => recording.world.push(*sample),
-                Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
-                Entry::Event(event) => {
-                    recording.events.push((log.since_first_s(stamped.log_time_ns), *event));
-                }
-                Entry::Unreadable { reason } => {
-                    recording.unreadable.get_or_insert(reason);
-                }
-                // A start record without frames after it says nothing.
-                Entry::ComputerStart(start) if start.released && recording.frames.is_empty() => {
-                    recording.start = Some(ComputerStart { frame: 0, ..*start });
-                }
-                Entry::ComputerFrame(frame) => {
-                    let lost = frame_order.note(frame.record.input.frame, stamped.lost_before).is_some();
-                    let logged = frame.record.input.frame;
-                    if let Some(computer) = &mut recording.at_release
-                        && recording.frames.is_empty()
-                        && frame.since_release.is_none()
-                    {
-                        let again = computer.run_again(&frame.record).ok().filter(|_| !lost);
-                        if again.is_none_or(|again| again.output != frame.record.output) {
-                            recording.at_release = None;
-                        }
-                    }
-                    if let Some(frame) = frame.in_flight() {
-                        recording.release_frame = logged - frame.input.frame;
-                        // What is lost before the release is not of the flight.
-                        if lost && frame.input.frame > 1 {
-                            frames_lost.get_or_insert(recording.frames.len());
-                        }
-                        recording.frames.push(frame);
-                    }
-                }
-                Entry::ComputerStart(start) => {
-                    recording.from_power_up |= !start.released;
-                    let head = log.head();
-                    if let (Some(Ok(toml)), true) = (&head.profile_toml, runs_the_pad && !start.released) {
-                        let computer = LoggedComputer::recorded(toml, &start, &head.run, &[]);
-                        recording.at_release = computer.ok().map(Box::new);
-                    }
-                }
-                Entry::Estimate(estimate) => {
-                    let place = recording.frames.len().checked_sub(1);
-                    recording.estimates.extend(place.map(|place| (place, *estimate)));
-                }
-                Entry::Verdict(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {}
-            }
-            recording.check_length()?;
+            reader.take(stamped, log)?;
         }
-        log.flights.refuse_several(&recording.name)?;
-        recording.cut = log.flights.cut();
-        recording.clocks = log.clocks;
-        recording.verdict = log.verdict();
-        recording.head = log.head().clone();
-        recording.last_ns = log.last_log_time_ns;
-        recording.damage = log.damage().map(ToString::to_string);
-        recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
-        Ok(recording)
+        reader.finish(log)
     }
 
     fn check_length(&self) -> Result<(), RecordingError> {
@@ -280,5 +207,101 @@ impl Recording {
                 Err(RecordingError::ProfileUnusable { name: self.name.clone(), reason: error.to_string() })
             }
         }
+    }
+}
+
+/// Collects the recording of a flight from the records of its log.
+pub(crate) struct RecordingReader {
+    recording: Recording,
+    order: FrameOrder,
+    frames_lost: Option<usize>,
+    runs_the_pad: bool,
+}
+
+impl RecordingReader {
+    /// `runs_the_pad`: the computer is run from its power-up to its release; one that is built at
+    /// its release lacks what the pad left in the memory of the recorded one.
+    pub(crate) fn of<R: Read>(log: &FlightLog<R>, runs_the_pad: bool) -> Self {
+        let recording = Recording { name: log.name().to_owned(), ..Recording::default() };
+        Self { recording, order: FrameOrder::default(), frames_lost: None, runs_the_pad }
+    }
+
+    /// Takes the next record of the log.
+    ///
+    /// # Errors
+    /// There are more than in any flight.
+    pub(crate) fn take<R: Read>(
+        &mut self,
+        stamped: StampedEntry,
+        log: &FlightLog<R>,
+    ) -> Result<(), RecordingError> {
+        let Self { recording, order: frame_order, frames_lost, runs_the_pad } = self;
+        match stamped.entry {
+            Entry::PilotTiming(timing) => recording.timings.push(*timing),
+            Entry::World(sample) => recording.world.push(*sample),
+            Entry::Telemetry(telemetry) => recording.telemetry.push(*telemetry),
+            Entry::Event(event) => {
+                recording.events.push((log.since_first_s(stamped.log_time_ns), *event));
+            }
+            Entry::Unreadable { reason } => {
+                recording.unreadable.get_or_insert(reason);
+            }
+            // A start record without frames after it says nothing.
+            Entry::ComputerStart(start) if start.released && recording.frames.is_empty() => {
+                recording.start = Some(ComputerStart { frame: 0, ..*start });
+            }
+            Entry::ComputerFrame(frame) => {
+                let lost = frame_order.note(frame.record.input.frame, stamped.lost_before).is_some();
+                let logged = frame.record.input.frame;
+                if let Some(computer) = &mut recording.at_release
+                    && recording.frames.is_empty()
+                    && frame.since_release.is_none()
+                {
+                    let again = computer.run_again(&frame.record).ok().filter(|_| !lost);
+                    if again.is_none_or(|again| again.output != frame.record.output) {
+                        recording.at_release = None;
+                    }
+                }
+                if let Some(frame) = frame.in_flight() {
+                    recording.release_frame = logged - frame.input.frame;
+                    // What is lost before the release is not of the flight.
+                    if lost && frame.input.frame > 1 {
+                        frames_lost.get_or_insert(recording.frames.len());
+                    }
+                    recording.frames.push(frame);
+                }
+            }
+            Entry::ComputerStart(start) => {
+                recording.from_power_up |= !start.released;
+                let head = log.head();
+                if let (Some(Ok(toml)), true) = (&head.profile_toml, *runs_the_pad && !start.released) {
+                    let computer = LoggedComputer::recorded(toml, &start, &head.run, &[]);
+                    recording.at_release = computer.ok().map(Box::new);
+                }
+            }
+            Entry::Estimate(estimate) => {
+                let place = recording.frames.len().checked_sub(1);
+                recording.estimates.extend(place.map(|place| (place, *estimate)));
+            }
+            Entry::Verdict(_) | Entry::RawFrame | Entry::Operator | Entry::Other => {}
+        }
+        recording.check_length()
+    }
+
+    /// The flight of a log that was read to its end.
+    ///
+    /// # Errors
+    /// It has several.
+    pub(crate) fn finish<R: Read>(self, log: &FlightLog<R>) -> Result<Recording, RecordingError> {
+        let Self { mut recording, frames_lost, .. } = self;
+        log.flights.refuse_several(&recording.name)?;
+        recording.cut = log.flights.cut();
+        recording.clocks = log.clocks;
+        recording.verdict = log.verdict();
+        recording.head = log.head().clone();
+        recording.last_ns = log.last_log_time_ns;
+        recording.damage = log.damage().map(ToString::to_string);
+        recording.frames_unbroken = frames_lost.unwrap_or(recording.frames.len());
+        Ok(recording)
     }
 }

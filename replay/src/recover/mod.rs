@@ -21,7 +21,7 @@ use write::Rescue;
 use crate::cli::Answer;
 use crate::log::LogError;
 use crate::output::WriteError;
-use crate::print::counted;
+use crate::print::{counted, messages_lost};
 
 /// Why nothing could be recovered.
 #[derive(Debug, thiserror::Error)]
@@ -86,7 +86,7 @@ impl Recovery {
 
     /// The damage of the log, also stored in the recovered one; `None` if it was intact.
     pub fn fault(&self) -> Option<String> {
-        let Recovered { messages, undecodable, beside_chunks, .. } = self.recovered;
+        let Recovered { messages, undecodable, beside_chunks, missing, .. } = self.recovered;
         let mut faults = Vec::new();
         faults.extend(self.lost.first().map(|lost| {
             let bytes: u64 = self.lost.iter().map(|lost| lost.bytes).sum();
@@ -100,6 +100,7 @@ impl Recovery {
         faults.extend(
             counted.map(|counted| format!("its summary counts {counted} messages, and {messages} are there")),
         );
+        faults.extend((missing > 0).then(|| messages_lost(missing)));
         if undecodable > 0 {
             faults.push(format!("{undecodable} messages of an unknown channel were dropped"));
         }

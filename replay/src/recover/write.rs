@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::RecoverError;
 use super::scan::{Contents, Records};
-use crate::log::{ComputerOrder, IN_ORDER_NS, Place};
+use crate::log::{ComputerOrder, IN_ORDER_NS, Place, Sequences};
 use crate::output::{NewFile, WriteError};
 
 /// Chunk size as in the recorder's own logs.
@@ -30,6 +30,7 @@ pub(crate) struct Rescue<'a> {
     schemas: BTreeMap<u16, u16>,
     channels: BTreeMap<u16, (u16, String)>,
     order: ComputerOrder,
+    sequences: Sequences,
     /// Messages that are still to be put in order; `None` while they are written as they come.
     held: Option<Vec<Held>>,
     pub(crate) recovered: Recovered,
@@ -57,6 +58,8 @@ pub struct Recovered {
     pub undecodable: u64,
     /// Messages from between the chunks.
     pub beside_chunks: u64,
+    /// Messages that were missing already, by their numbers.
+    pub missing: u64,
     /// Some message comes later than one that belongs behind it.
     pub out_of_order: bool,
     /// How the recovered log is in order; `None` if it was, or if no order was found.
@@ -72,12 +75,14 @@ impl<'a> Rescue<'a> {
     ) -> Result<Self, RecoverError> {
         let mut rescue = Self::begin(output, contents, None)?;
         rescue.add_all(records)?;
+        let missing = rescue.sequences.lost();
         if rescue.recovered.out_of_order {
             drop(rescue);
             rescue = Self::begin(output, contents, Some(Vec::new()))?;
             rescue.add_all(records)?;
             rescue.put_in_order().map_err(|error| rescue.failed(error))?;
         }
+        rescue.recovered.missing = missing;
         Ok(rescue)
     }
 
@@ -97,6 +102,7 @@ impl<'a> Rescue<'a> {
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             order: ComputerOrder::default(),
+            sequences: Sequences::default(),
             held,
             recovered: Recovered::default(),
         })
@@ -203,6 +209,7 @@ impl<'a> Rescue<'a> {
         let (channel_id, topic) = &self.channels[&header.channel_id];
         let is_broken = self.order.is_broken_by(topic, header.log_time);
         let header = MessageHeader { channel_id: *channel_id, ..header };
+        self.sequences.note(header.channel_id, header.sequence);
         if let Some(held) = &mut self.held {
             let frame = match topic.as_str() {
                 TOPIC_COMPUTER_FRAME => ComputerFrame::decode(data).ok().map(|frame| frame.input.frame),

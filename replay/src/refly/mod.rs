@@ -19,7 +19,6 @@ mod others;
 pub(crate) mod rerun;
 
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -30,7 +29,7 @@ use prost::Message as _;
 use protocol::log::computer_v1::{ComputerFrame, ComputerInput, ComputerOutput};
 use protocol::log::record::{Event, EventLevel, Record};
 use protocol::log::v1::LimitResult;
-use protocol::log::writer::{LogHeader, LogWriter};
+use protocol::log::writer::LogHeader;
 use protocol::program::Exit;
 use serde::Serialize;
 use sim::sortie::SetUpError;
@@ -40,8 +39,8 @@ pub use self::others::{OtherFlights, other_flights};
 use self::rerun::Rerun;
 use crate::cli::{Answer, WithSettings, give};
 use crate::controller::{AgainError, SETTINGS_IN_FLIGHT, phase_name, refuse};
-use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share};
-use crate::output::{NewFile, WriteError};
+use crate::log::{Clock, ClockTime, Moment, Recording, Verdict, share, write_records};
+use crate::output::WriteError;
 use crate::print::{counted, verdict_table};
 use crate::settings::{Schedule, Setting, mission_with, truth_with};
 
@@ -390,24 +389,6 @@ pub fn write_log(
         scenario_toml: recording.head.scenario_toml.clone(),
     };
     write_records(output, &header, &flight.records)
-}
-
-/// Writes records with their times since the start, s, as a log.
-///
-/// # Errors
-/// The file cannot be created or written.
-pub(crate) fn write_records(
-    output: &Path,
-    header: &LogHeader,
-    records: &[(f64, Record)],
-) -> Result<PathBuf, WriteError> {
-    NewFile::create(output)?.fill(|file| {
-        let mut log = LogWriter::new(BufWriter::new(file), header).map_err(io::Error::other)?;
-        for (time_s, record) in records {
-            log.write(record, (time_s * 1e9) as u64).map_err(io::Error::other)?;
-        }
-        log.finish().map_err(io::Error::other)?.flush()
-    })
 }
 
 /// Facts about the run of a re-flown flight.

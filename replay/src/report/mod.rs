@@ -18,8 +18,8 @@ use protocol::program::Exit;
 use track::Flight;
 
 use crate::cli::answer;
-use crate::info::{Completeness, described};
-use crate::log::{Recording, RecordingError};
+use crate::info::{Completeness, recorded};
+use crate::log::RecordingError;
 use crate::output::NewFile;
 
 /// A flight's page.
@@ -39,8 +39,7 @@ pub struct Report {
 /// The file is not a flight log, cannot be read or is longer than any flight. Damage is part of the
 /// page.
 pub fn report(path: &Path) -> Result<Report, RecordingError> {
-    let recording = Recording::open_from_power_up(path)?;
-    let mut info = described(path)?;
+    let (mut info, recording) = recorded(path)?;
     // The date says it.
     info.run.remove("start_unix_ns");
     let flight = Flight::of(recording, &mut info);

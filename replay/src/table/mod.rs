@@ -9,21 +9,24 @@
 //! separate table.
 
 mod dialect;
+mod layout;
 
 use std::collections::BTreeMap;
 use std::io::Read;
 
 use flight::rules::verdict::Landing;
 use prost_reflect::{
-    DescriptorPool, DynamicMessage, FieldDescriptor, Kind as FieldKind, MessageDescriptor,
-    ReflectMessage as _, Value,
+    DescriptorPool, DynamicMessage, Kind as FieldKind, MessageDescriptor, ReflectMessage as _, Value,
 };
 use protocol::identity::Address;
 use protocol::log::reader::LogChannel;
-use protocol::log::record::{TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_VERDICT};
+use protocol::log::record::{
+    TOPIC_COMPUTER_FRAME, TOPIC_COMPUTER_START, TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_VERDICT,
+};
 use protocol::log::v1;
 
 use self::dialect::{cells_of_frame, shape_of_frame};
+use self::layout::{Layout, Scalar, Slot};
 use crate::log::{Entry, FlightLog, LogError, RECORD_MAX_BYTES, StampedEntry, frame_of};
 
 /// A list up to this length has one column for each element; a longer one, has none.
@@ -33,6 +36,10 @@ const LIST_MAX: usize = 8;
 const UNITS: [&str; 13] = [
     "_rad_s2", "_rad_s", "_m_s2", "_m_s", "_kg_m2", "_bytes", "_rad", "_deg", "_kg", "_ms", "_m", "_n", "_s",
 ];
+
+/// The topics whose records are decoded for a table; the others are read by the schema in the log.
+pub(crate) const DECODED: [&str; 6] =
+    [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_EVENTS, TOPIC_RAW_RX, TOPIC_RAW_TX, TOPIC_VERDICT];
 
 /// Column of the flight computer's frames that is not in the record: time since the release, s.
 pub(crate) const FLIGHT_TIME_S: &str = "flight_time_s";
@@ -70,13 +77,6 @@ pub struct TableShape {
     pub columns: Vec<Column>,
 }
 
-/// Path of a column's value in a record: fields from the outside in, and an element of a list.
-#[derive(Debug, Clone)]
-pub(super) struct Place {
-    pub(super) fields: Vec<FieldDescriptor>,
-    pub(super) element: Option<usize>,
-}
-
 impl TableShape {
     pub(super) fn new(name: &str, columns: &[(&str, Kind)]) -> Self {
         let time = Column::of("log_time_ns", Kind::Integer);
@@ -89,16 +89,12 @@ impl TableShape {
         self.columns.iter().position(|column| column.name == name)
     }
 
-    /// The table of a kind of record, and the paths of its columns' values, without the time. Lists
-    /// are assumed to be as long as in this first record.
-    pub(super) fn of_record(name: &str, first: &DynamicMessage) -> (Self, Vec<Place>) {
+    /// The table of a kind of record, and the columns of its fields, which begin behind the time.
+    /// Lists are assumed to be as long as in this first record.
+    fn of_record(name: &str, first: &DynamicMessage) -> (Self, Layout) {
         let mut shape = Self::new(name, &[]);
-        let mut places = Vec::new();
-        walk(&first.descriptor(), Some(first), &mut Vec::new(), &mut |column, place| {
-            shape.columns.push(column);
-            places.push(place);
-        });
-        (shape, places)
+        let layout = layout(&first.descriptor(), Some(first), &mut Vec::new(), &mut shape.columns);
+        (shape, layout)
     }
 }
 
@@ -108,54 +104,51 @@ pub(super) fn table_name(topic: &str) -> String {
     topic.trim_matches('/').chars().map(word).collect()
 }
 
-fn walk(
+/// The columns of a message's fields, which are added to the others; `above` are the names of the
+/// fields that contain it.
+fn layout(
     descriptor: &MessageDescriptor,
     record: Option<&DynamicMessage>,
-    above: &mut Vec<FieldDescriptor>,
-    take: &mut impl FnMut(Column, Place),
-) {
+    above: &mut Vec<String>,
+    columns: &mut Vec<Column>,
+) -> Layout {
+    let mut layout = Layout::default();
     // A schema may contain itself; this is the deepest nesting that is followed.
     if above.len() > LIST_MAX {
-        return;
+        return layout;
     }
     for field in descriptor.fields() {
-        above.push(field.clone());
-        let name = above.iter().map(|field| field.name().to_owned()).collect::<Vec<_>>().join(".");
+        above.push(field.name().to_owned());
+        let name = above.join(".");
         let value = record.map(|record| record.get_field(&field).into_owned());
-        match (field.kind(), kind_of(&field), value) {
+        let (first, kind) = (columns.len(), field.kind());
+        let slot = match (kind, Scalar::of(&field.kind()), value) {
             (FieldKind::Message(inner), _, value) if !field.is_list() && !field.is_map() => {
                 let below = value.as_ref().and_then(|value| value.as_message());
-                walk(&inner, below, above, take);
+                Some(Slot::Message(self::layout(&inner, below, above, columns)))
             }
-            (_, Some(kind), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
-                for element in 0..items.len() {
-                    let place = Place { fields: above.clone(), element: Some(element) };
-                    take(Column { name: element_name(&name, element), kind }, place);
-                }
+            (_, Some(scalar), Some(Value::List(items))) if field.is_list() && items.len() <= LIST_MAX => {
+                let count = items.len();
+                let named = |element| Column { name: element_name(&name, element), kind: scalar.column };
+                columns.extend((0..count).map(named));
+                Some(Slot::Values { scalar, first, count })
             }
-            (_, Some(kind), _) if !field.is_list() => {
-                take(Column { name, kind }, Place { fields: above.clone(), element: None });
+            (_, Some(scalar), _) if !field.is_list() => {
+                columns.push(Column { name, kind: scalar.column });
+                Some(Slot::Values { scalar, first, count: 1 })
             }
-            _ => {}
-        }
+            _ => None,
+        };
+        layout.0.extend(slot.map(|slot| (field.number(), slot)));
         above.pop();
     }
+    layout
 }
 
 /// The second element of `fins_rad` is `fins_2_rad`: the unit stays at the end.
 fn element_name(name: &str, element: usize) -> String {
     let unit = UNITS.into_iter().find(|suffix| name.ends_with(suffix)).unwrap_or_default();
     format!("{}_{}{unit}", name.strip_suffix(unit).unwrap_or(name), element + 1)
-}
-
-/// `None` for what has no cell: messages, enums, bytes.
-fn kind_of(field: &FieldDescriptor) -> Option<Kind> {
-    match cell_of(&Value::default_value(&field.kind())) {
-        Cell::Float(_) => Some(Kind::Float),
-        Cell::Integer(_) => Some(Kind::Integer),
-        Cell::Text(_) => Some(Kind::Text),
-        Cell::Absent => None,
-    }
 }
 
 /// A value of a row.
@@ -198,16 +191,23 @@ pub struct TableReader {
     channels: BTreeMap<u16, Option<OpenTable>>,
     /// The tables of MAVLink messages.
     messages: BTreeMap<(Address, u32), usize>,
+    /// MAVLink messages have no rows.
+    leaves_messages_out: bool,
 }
 
 /// The known structure of a channel's records.
 struct OpenTable {
     table: usize,
-    descriptor: MessageDescriptor,
-    places: Vec<Place>,
+    columns: usize,
+    layout: Layout,
 }
 
 impl TableReader {
+    /// Reads the tables of records alone.
+    pub(crate) fn without_messages() -> Self {
+        Self { leaves_messages_out: true, ..Self::default() }
+    }
+
     /// Passes every row of a log to `take`.
     ///
     /// # Errors
@@ -241,6 +241,7 @@ impl TableReader {
                 ];
                 vec![Row { table, cells }]
             }
+            Entry::RawFrame if self.leaves_messages_out => Vec::new(),
             Entry::RawFrame => self.message(log, stamped, time).into_iter().collect(),
             Entry::Verdict(verdict) => {
                 let mut rows = self.limits_of(verdict, &time);
@@ -270,23 +271,25 @@ impl TableReader {
     fn record<R: Read>(&mut self, log: &FlightLog<R>, stamped: &StampedEntry, time: Cell) -> Option<Row> {
         let channel = log.channel(stamped.channel_id).filter(|_| stamped.data.len() <= RECORD_MAX_BYTES)?;
         let opened = || {
-            let descriptor = described(channel)?;
-            let first = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
-            let (mut shape, places) = TableShape::of_record(&table_name(&channel.topic), &first);
-            if matches!(stamped.entry, Entry::ComputerFrame(_)) {
+            let first = DynamicMessage::decode(described(channel)?, stamped.data.as_slice()).ok()?;
+            let (mut shape, layout) = TableShape::of_record(&table_name(&channel.topic), &first);
+            if channel.topic == TOPIC_COMPUTER_FRAME {
                 shape.columns.push(Column::of(FLIGHT_TIME_S, Kind::Float));
             }
-            Some(OpenTable { table: place_of(&mut self.shapes, shape), descriptor, places })
+            let columns = shape.columns.len();
+            Some(OpenTable { table: place_of(&mut self.shapes, shape), columns, layout })
         };
         let known = self.channels.entry(stamped.channel_id).or_insert_with(opened);
-        let OpenTable { table, descriptor, places } = known.as_ref()?;
-        let message = DynamicMessage::decode(descriptor.clone(), stamped.data.as_slice()).ok()?;
-        let values = places.iter().map(|place| value_at(&message, &place.fields, place.element));
-        let flight_time = match &stamped.entry {
-            Entry::ComputerFrame(frame) => Some(frame.flight_time_s().map_or(Cell::Absent, Cell::Float)),
-            _ => None,
-        };
-        Some(Row { table: *table, cells: std::iter::once(time).chain(values).chain(flight_time).collect() })
+        let OpenTable { table, columns, layout } = known.as_ref()?;
+        let mut cells = vec![Cell::Absent; *columns];
+        layout.read(&stamped.data, &mut cells).ok()?;
+        cells[0] = time;
+        if let Entry::ComputerFrame(frame) = &stamped.entry
+            && let Some(last) = cells.last_mut()
+        {
+            *last = frame.flight_time_s().map_or(Cell::Absent, Cell::Float);
+        }
+        Some(Row { table: *table, cells })
     }
 
     fn limits_of(&mut self, verdict: &v1::LandingVerdict, time: &Cell) -> Vec<Row> {
@@ -320,21 +323,6 @@ fn place_of(shapes: &mut Vec<TableShape>, shape: TableShape) -> usize {
     })
 }
 
-fn value_at(message: &DynamicMessage, fields: &[FieldDescriptor], element: Option<usize>) -> Cell {
-    let Some((field, inner)) = fields.split_first() else {
-        return Cell::Absent;
-    };
-    if field.supports_presence() && !message.has_field(field) {
-        return Cell::Absent;
-    }
-    let value = message.get_field(field);
-    match value.as_ref() {
-        Value::Message(message) => value_at(message, inner, element),
-        Value::List(items) => element.and_then(|at| items.get(at)).map_or(Cell::Absent, cell_of),
-        value => cell_of(value),
-    }
-}
-
 /// Describes a channel's records from the schema in the log; `None` for records that are not ours.
 fn described(channel: &LogChannel) -> Option<MessageDescriptor> {
     if channel.message_encoding != "protobuf" || !channel.schema_name.starts_with("touchdown.") {
@@ -342,20 +330,6 @@ fn described(channel: &LogChannel) -> Option<MessageDescriptor> {
     }
     let pool = DescriptorPool::decode(channel.schema.as_ref()).ok()?;
     pool.get_message_by_name(&channel.schema_name)
-}
-
-fn cell_of(value: &Value) -> Cell {
-    match value {
-        Value::F64(number) => Cell::Float(*number),
-        Value::F32(number) => Cell::Float(f64::from(*number)),
-        Value::I32(number) => Cell::Integer(i64::from(*number)),
-        Value::I64(number) => Cell::Integer(*number),
-        Value::U32(number) => Cell::Integer(i64::from(*number)),
-        Value::U64(number) => Cell::Integer(number.cast_signed()),
-        Value::Bool(flag) => Cell::Integer(i64::from(*flag)),
-        Value::String(text) => Cell::Text(text.clone()),
-        _ => Cell::Absent,
-    }
 }
 
 #[cfg(test)]

@@ -270,6 +270,7 @@ impl FlightVerifier {
             obstacle,
             cut,
             damage: damage.map(ToString::to_string),
+            messages_lost: log.messages_lost(),
             build: head.compare_build(),
             ..self.report
         };

@@ -41,7 +41,7 @@ use serde::Serialize;
 use crate::cli::{Answer, give_each, logs_of, print_note, warn_of_loss};
 use crate::controller::FrameError;
 use crate::log::{BuildComparison, Cut, Entry, FlightLog, Gap, Head, LogError, LoggedFlight};
-use crate::print::counted;
+use crate::print::{counted, messages_lost};
 
 /// The topics that a verification reads.
 const VERIFIED: [&str; 3] = [TOPIC_COMPUTER_START, TOPIC_COMPUTER_FRAME, TOPIC_VERDICT];
@@ -223,6 +223,8 @@ pub struct VerifyReport {
     pub cut: Option<Cut>,
     /// Why the log could not be read to its end.
     pub damage: Option<String>,
+    /// Records that are missing, by their numbers.
+    pub messages_lost: u64,
     /// Comparison of the build that wrote the log with this one.
     pub build: BuildComparison,
     /// Only a whole flight of which everything was compared is identical.
@@ -284,7 +286,11 @@ impl VerifyReport {
             Verification::Impossible
         } else if self.obstacle.is_some() {
             Verification::NotReplayable
-        } else if self.damage.is_some() || self.cut.is_some() || !self.parts.iter().all(complete) {
+        } else if self.damage.is_some()
+            || self.cut.is_some()
+            || self.messages_lost > 0
+            || !self.parts.iter().all(complete)
+        {
             Verification::IdenticalReadablePart
         } else {
             Verification::Identical
@@ -375,7 +381,8 @@ impl VerifyReport {
     fn what_is_missing(&self) -> String {
         let cut = self.cut.as_ref().map(|cut| format!(" of an INCOMPLETE flight: {cut}"));
         let unread = self.damage.as_ref().map(|damage| format!("; not all of it was read: {damage}"));
-        [cut, unread].into_iter().flatten().collect()
+        let lost = (self.messages_lost > 0).then(|| format!("; {}", messages_lost(self.messages_lost)));
+        [cut, unread, lost].into_iter().flatten().collect()
     }
 }
 

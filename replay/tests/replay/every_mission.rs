@@ -54,7 +54,7 @@ const REPLAY: &str = env!("CARGO_BIN_EXE_replay");
 /// Rows run in this order: some read a file that an earlier row wrote.
 const TABLE: [Row; 16] = [
     row(
-        "info {log}",
+        "info --again {log}",
         (0, &["verdict     STANDS UNDAMAGED", "its mission {mission}\n", "complete    yes", " plans; CPU"]),
         (0, &["verdict     ABORTED", "abort of the crew", "its mission {mission}\n", "complete    yes"]),
         (
