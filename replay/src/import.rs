@@ -209,12 +209,39 @@ fn phase_of(state: &str) -> Option<u32> {
     Some(phase as u32)
 }
 
+/// The text of a table: UTF-16 where its mark says so, else UTF-8.
+fn text_of(bytes: &[u8]) -> Result<String> {
+    let units = |unit: fn([u8; 2]) -> u16| {
+        let units = bytes[2..].as_chunks().0.iter().map(|pair| unit(*pair));
+        char::decode_utf16(units).collect::<Result<String, _>>().context("it is damaged UTF-16")
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => units(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => units(u16::from_be_bytes),
+        // Only names of columns have other letters.
+        _ => Ok(String::from_utf8_lossy(bytes).into_owned()),
+    }
+}
+
+/// The names in the head of a table, in lower case.
+fn names_of<'a>(head: impl Iterator<Item = &'a str>) -> Option<Vec<String>> {
+    let name = |name: &str| name.trim_matches(['#', ' ', '\u{feff}', '"']).to_lowercase();
+    let names: Vec<String> = head.map(name).collect();
+    COLUMNS[0].0.iter().any(|time| names.iter().any(|name| name == time)).then_some(names)
+}
+
 fn table(file: &Path) -> Result<Track> {
+    let text = text_of(&std::fs::read(file)?)?;
+    let is_head = |separator: &char| text.lines().any(|line| names_of(line.split(*separator)).is_some());
+    let separator = [',', ';', '\t'].into_iter().find(is_head).context(
+        "no line has the head of a column of times, `time` or `Time (s)`, between commas, semicolons or tabs",
+    )?;
     let rows = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .trim(csv::Trim::All)
-        .from_path(file)?
+        .delimiter(separator as u8)
+        .from_reader(text.as_bytes())
         .into_records();
     let mut heads: Vec<String> = Vec::new();
     let mut samples = Vec::new();
@@ -224,23 +251,25 @@ fn table(file: &Path) -> Result<Track> {
         let line = row.position().map_or(0, csv::Position::line);
         let first = row.get(0).unwrap_or_default();
         if heads.is_empty() || first.starts_with('#') {
-            let names: Vec<String> = row
-                .iter()
-                .map(|name| name.trim_start_matches(['#', ' ', '\u{feff}']).to_lowercase())
-                .collect();
-            if COLUMNS[0].0.iter().any(|time| names.iter().any(|name| name == time)) {
-                heads = names;
-            }
+            heads = names_of(row.iter()).unwrap_or(heads);
             continue;
         }
+        let values = row.iter().enumerate().filter(|(_, value)| !value.is_empty());
+        let values = values.last().map_or(0, |(last, _)| last + 1);
+        ensure!(
+            values <= heads.len(),
+            "line {line}: {values} values under {} heads: is the decimal sign the separator, too?",
+            heads.len()
+        );
         let cell = |name: &str| row.get(heads.iter().position(|head| head == name)?);
         let mut sample = Telemetry::default();
         for (names, set) in COLUMNS {
             let Some((name, text)) = names.iter().find_map(|name| Some((name, cell(name)?))) else {
                 continue;
             };
+            let number = if separator == ',' { text.to_owned() } else { text.replace(',', ".") };
             let value: f64 =
-                text.parse().with_context(|| format!("line {line}, {name}: {text}: not a number"))?;
+                number.parse().with_context(|| format!("line {line}, {name}: {text}: not a number"))?;
             if value.is_finite() {
                 set(&mut sample, value);
             }

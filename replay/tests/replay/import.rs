@@ -148,6 +148,27 @@ fn val_hand_a_px4_file() {
     assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-3, "{last:?}");
 }
 
+/// UTF-16 of both byte orders, semicolons with decimal commas, and tabs, as spreadsheets save them.
+#[test]
+fn val_hand_a_table_in_the_encodings_and_separators_of_spreadsheets() {
+    let mut text = "Time (s),Altitude (m)\n".to_owned();
+    for step in TIMES {
+        text.extend([format!("{:.1},{:.2}\n", f64::from(step) / 10.0, height_m(step))]);
+    }
+    let semicolons = text.replace(',', ";").replace('.', ",");
+    let units = |unit: fn(u16) -> [u8; 2]| {
+        "\u{feff}".encode_utf16().chain(text.encode_utf16()).flat_map(unit).collect::<Vec<u8>>()
+    };
+    let tables =
+        [units(u16::to_le_bytes), units(u16::to_be_bytes), semicolons.into(), text.replace(',', "\t").into()];
+    for bytes in tables {
+        let (flight, missing) = imported("table.csv", &bytes);
+        assert_eq!(missing, ["position", "climb", "horizontal velocity", "tilt"]);
+        let last = flight.telemetry.last().unwrap();
+        assert!((last.time_s - 3.9).abs() < 1e-9, "{last:?}");
+    }
+}
+
 #[test]
 fn what_is_wrong_with_a_file_is_named() {
     let directory = tempfile::tempdir().unwrap();
@@ -156,6 +177,12 @@ fn what_is_wrong_with_a_file_is_named() {
         ("a.csv", b"a,b\n1,2\n", "`time` or `Time (s)`"),
         ("b.csv", b"time,speed\n1,2\n", "no column of heights"),
         ("c.csv", b"time,height\n1,x\n", "line 2, height: x: not a number"),
+        (
+            "d.csv",
+            b"time,height\n1,5,30,5\n",
+            "line 2: 4 values under 2 heads: is the decimal sign the separator",
+        ),
+        ("e.csv", b"time height\n1 5\n", "between commas, semicolons or tabs"),
         ("a.bin", b"nothing of it", "no XKF1 or NKF1"),
         ("a.ulg", b"nothing of it", "a.ulg"),
     ] {
