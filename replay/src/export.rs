@@ -13,9 +13,10 @@ use anyhow::Result;
 use protocol::program::Exit;
 use serde::Serialize;
 
-use crate::cli::{Answer, give, warn_of_loss};
+use crate::cli::{Answer, answer, ending, give, warn_of_loss};
 use crate::log::FlightLog;
 use crate::output::{NewFile, WriteError, new_folder};
+use crate::report::FlownPath;
 use crate::table::{Cell, DECODED, TableReader, TableShape};
 
 /// A file that was written.
@@ -89,16 +90,25 @@ fn write_cell(cell: &Cell, text: &mut Vec<u8>) -> io::Result<()> {
 pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
-    /// The directory to write: one file for each table.
+    /// The directory to write, one file for each table; or a file for maps, .kml or .gpx: the flown
+    /// path, the touchdown planned at ignition, and the fence.
     #[arg(long, short, alias = "output", value_name = "PATH")]
     out: PathBuf,
-    /// Answer in JSON.
+    /// Answer about tables in JSON.
     #[arg(long)]
     json: bool,
 }
 
 impl Args {
     pub(crate) fn run(self) -> Result<Exit> {
+        let ending = ending(&self.out);
+        if ["kml", "gpx"].contains(&ending.as_str()) {
+            let flown = FlownPath::open(&self.file)?;
+            let text = if ending == "kml" { flown.kml() } else { flown.gpx() };
+            let path = NewFile::create(&self.out)?.fill(|file| file.write_all(text.as_bytes()))?;
+            answer(|output| writeln!(output, "{}: {}", path.display(), flown.contents()))?;
+            return Ok(Exit::Yes);
+        }
         let mut log = FlightLog::open(&self.file)?.decoding(&DECODED);
         let files = export_tables(&mut log, &self.out)?;
         let outcome = give(&files, self.json)?;

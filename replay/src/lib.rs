@@ -21,7 +21,7 @@
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`import`](mod@import): flights of other programs as logs.
-//! * [`export`]: writes a log as CSV; [`recover`](mod@recover): repairs a damaged log.
+//! * [`export`]: writes a log as CSV, and the flown path for maps; [`recover`](mod@recover): repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a
 //!   name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other.
@@ -125,8 +125,11 @@ enum Command {
     /// script.
     #[command(after_help = "Example: replay report flight.mcap")]
     Report(report::Args),
-    /// Writes a log's content as CSV; replay-rerun writes a Rerun recording.
-    #[command(after_help = "Example: replay export flight.mcap --out tables")]
+    /// Writes a log's content as CSV, or the flown path as KML or GPX; replay-rerun writes a Rerun
+    /// recording.
+    #[command(
+        after_help = "Examples:\n  replay export flight.mcap --out tables\n  replay export flight.mcap --out flight.kml"
+    )]
     Export(export::Args),
     /// Imports a flight of another program: PX4 (.ulg), ArduPilot (.bin), and .csv of AltOS,
     /// RocketPy and OpenRocket.

@@ -8,12 +8,14 @@
 
 mod chart;
 mod html;
+mod path;
 mod section;
 mod track;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+pub(crate) use path::FlownPath;
 use protocol::program::Exit;
 use track::Flight;
 

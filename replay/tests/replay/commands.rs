@@ -168,3 +168,33 @@ fn a_recovered_log_is_not_complete() {
     let other = files.directory.path().join("x");
     refusal(replay("recover", &files.file(b"nothing")).arg(other));
 }
+
+/// A degree of latitude is 110,941.6 m and of longitude 90,899.4 m at 35.347 degrees north (WGS 84).
+#[test]
+fn val_wgs84_the_flown_path_is_exported_for_maps() {
+    let log = &crate::simulated::WITH_FRAMES.log;
+    let folder = tempfile::tempdir().unwrap();
+    let texts = ["flight.kml", "flight.gpx"].map(|name| {
+        let path = folder.path().join(name);
+        let (code, stdout, stderr) = run(replay("export", log).arg("--out").arg(&path));
+        assert_eq!(code, 0, "{stderr}");
+        assert!(stdout.contains(" pad, touchdown planned at ignition, touchdown, fence"), "{stdout}");
+        std::fs::read_to_string(&path).unwrap()
+    });
+    let documents = texts.each_ref().map(|text| roxmltree::Document::parse(text).unwrap());
+    let world = crate::simulated::WITH_FRAMES.recording().world;
+    let first = &world[0].state.position_m;
+    let points: Vec<_> = documents[1].descendants().filter(|node| node.has_tag_name("trkpt")).collect();
+    assert!(points.len() > 100, "{}", points.len());
+    let degrees = |name: &str| points[0].attribute(name).unwrap().parse::<f64>().unwrap();
+    let pad = documents[1].descendants().find(|node| node.has_tag_name("wpt")).unwrap();
+    let of_pad = |name: &str| pad.attribute(name).unwrap().parse::<f64>().unwrap();
+    // World: x north, y west. Seven decimals of a degree are a centimetre.
+    assert!(((degrees("lat") - of_pad("lat")) * 110_941.6 - first.x).abs() < 0.05);
+    assert!(((degrees("lon") - of_pad("lon")) * 90_899.4 + first.y).abs() < 0.05);
+    let names = |tag: &str| {
+        let of_tag = documents[0].descendants().filter(|node| node.has_tag_name(tag));
+        of_tag.map(|node| node.text().unwrap_or_default().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(names("name")[1..], ["pad", "touchdown planned at ignition", "touchdown", "track", "fence"]);
+}
