@@ -140,7 +140,7 @@ fn a_position_shows_the_same_screen_however_it_was_reached() {
     assert!(screen(&straight).contains("REPLAY plays 43.0 of 60.0 s"));
 }
 
-/// From the beginning on: the recorded flight lasts 32 s. An axis of 20 s would have a tick at 15 s.
+/// The recorded flight lasts 32 s. An axis of 20 s would have a tick at 15 s.
 #[test]
 fn the_recorded_flight_fills_the_axis_of_time() {
     let mut player = player();
