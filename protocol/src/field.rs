@@ -25,8 +25,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    pub const ALL: [Self; 5] =
-        [Self::Boundary, Self::Road, Self::CrowdLine, Self::Trees, Self::LandingArea];
+    pub const ALL: [Self; 5] = [Self::Boundary, Self::Road, Self::CrowdLine, Self::Trees, Self::LandingArea];
 
     /// Its name in files and on screens.
     pub const fn name(self) -> &'static str {
@@ -113,14 +112,13 @@ impl Field {
         };
         let mut lines = Vec::new();
         for (place, (name, stated, paths)) in features.into_iter().enumerate() {
-            let read = match Kind::of(stated.as_deref().unwrap_or(&name)) {
+            let read: Result<Vec<Line>, String> = match Kind::of(stated.as_deref().unwrap_or(&name)) {
                 Some(kind) => paths.iter().map(|path| line(kind, path, pad)).collect(),
                 None => Err(format!(
                     "its kind is not one of {}; accepted: a property `kind`, or a name that begins with it",
                     Kind::ALL.map(Kind::name).join(", ")
                 )),
             };
-            let read: Result<Vec<Line>, String> = read;
             match read {
                 Ok(read) => lines.extend(read),
                 Err(problem) => return Err(FieldError::Feature { origin, number: place + 1, name, problem }),
@@ -194,7 +192,9 @@ fn of_geojson(text: &str) -> Result<Vec<Feature>, String> {
     let features = match parsed {
         GeoJson::FeatureCollection(collection) => collection.features,
         GeoJson::Feature(feature) => vec![feature],
-        GeoJson::Geometry(_) => return Err("a geometry has no kind; accepted: a FeatureCollection".to_owned()),
+        GeoJson::Geometry(_) => {
+            return Err("a geometry has no kind; accepted: a FeatureCollection".to_owned());
+        }
     };
     let read = features.into_iter().map(|feature| {
         let text = |key: &str| feature.property(key).and_then(|value| value.as_str()).map(str::to_owned);
@@ -225,7 +225,9 @@ fn add_paths(geometry: &GeometryValue, paths: &mut Vec<Vec<[f64; 2]>>) {
             paths.extend(coordinates.iter().flatten().map(|line| path(line)));
         }
         GeometryValue::GeometryCollection { geometries } => {
-            geometries.iter().for_each(|geometry| add_paths(&geometry.value, paths));
+            for geometry in geometries {
+                add_paths(&geometry.value, paths);
+            }
         }
     }
 }
@@ -275,7 +277,7 @@ mod tests {
         Field::parse(text, PAD, "field").map_err(|error| error.to_string())
     }
 
-    /// 0.0009 degrees of latitude are 99.86 m at 35.3 degrees north, 0.002 are 221.9 m (110,957 m
+    /// 0.0009 degrees of latitude are 99.86 m at 35.3 degrees north, 0.002 are 221.9 m (110,947 m
     /// a degree).
     #[test]
     fn val_wgs84_distances_to_lines_of_both_formats() {
@@ -298,10 +300,14 @@ mod tests {
         for (text, words) in [
             ("", "field: neither GeoJSON nor KML: ".to_owned()),
             ("<kml>", "field: neither GeoJSON nor KML: ".to_owned()),
-            ("{\"type\": \"FeatureCollection\", \"features\": []}", "field: has 0 points; accepted: 1 to 20000".to_owned()),
+            (
+                "{\"type\": \"FeatureCollection\", \"features\": []}",
+                "field: has 0 points; accepted: 1 to 20000".to_owned(),
+            ),
             (
                 "{\"type\": \"Point\", \"coordinates\": [1, 2]}",
-                "field: neither GeoJSON nor KML: a geometry has no kind; accepted: a FeatureCollection".to_owned(),
+                "field: neither GeoJSON nor KML: a geometry has no kind; accepted: a FeatureCollection"
+                    .to_owned(),
             ),
             (
                 &GEOJSON.replace("\"kind\": \"trees\"", "\"kind\": \"pond\""),
@@ -309,7 +315,8 @@ mod tests {
             ),
             (
                 &GEOJSON.replace("[-117.812, 35.3461]", "[35.3461, -117.812]"),
-                "field: feature 1 (spectators): longitude 35.3461, latitude -117.812; accepted: -180 to 180".to_owned(),
+                "field: feature 1 (spectators): longitude 35.3461, latitude -117.812; accepted: -180 to 180"
+                    .to_owned(),
             ),
             (
                 &KML.replace("-117.812,35.3461,0", "-11.7812,35.3461,0"),

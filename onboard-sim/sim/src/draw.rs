@@ -74,7 +74,8 @@ pub fn draw(mission: &Mission, dispersion: &Dispersion, seed: u64, number: u64) 
     let roll_rad = TAU * chance.unit();
     let flight_seed = chance.random.next_u64();
 
-    let wind = Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).with_aloft(sigma.winds_aloft.as_ref());
+    let wind =
+        Wind::new(truth.wind_m_s, truth.wind_towards_rad, 0.0, 0).with_aloft(sigma.winds_aloft.as_ref());
     let carried = wind.mean_m_s(height_m) * start.carried_share;
     // It leans in the direction of its motion; the roll angle is arbitrary.
     let leaning = Vector3::z().cross(&away) * start.tilt_deg.to_radians();

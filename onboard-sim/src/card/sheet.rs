@@ -171,7 +171,10 @@ impl Card {
             ("name", Some(mission.name.clone())),
             ("site", Some(mission.site.to_string())),
             ("wind", Some(self.recipe.dispersion.wind_over_height())),
-            ("field", field_of(&self.recipe).map(|field| field.distances(pad_of(&self.recipe.mission), (0.0, 0.0)))),
+            (
+                "field",
+                field_of(&self.recipe).map(|field| field.distances(pad_of(&self.recipe.mission), (0.0, 0.0))),
+            ),
             ("hash", Some(self.hash())),
             ("controller", Some(mission.changed.join(", ")).filter(|changed| !changed.is_empty())),
             ("ascent", launch.map(|launch| motor(&launch.booster.motor_curve))),

@@ -19,7 +19,13 @@ pub(crate) struct CardArguments {
     #[command(flatten)]
     selection: Selection,
     /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
-    #[arg(long = "wind", conflicts_with = "winds_file", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
+    #[arg(
+        long = "wind",
+        conflicts_with = "winds_file",
+        value_delimiter = ',',
+        default_value = "0,3,6,8.9",
+        value_name = "M/S,..."
+    )]
     winds: Vec<f64>,
     /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up
     /// and the line downwind. By default downwind is up.

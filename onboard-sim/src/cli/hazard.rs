@@ -24,7 +24,13 @@ pub(crate) struct HazardArguments {
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
     /// Mean winds 10 m above the ground, m/s.
-    #[arg(long = "wind", conflicts_with = "winds_file", value_delimiter = ',', default_value = "0,3,6,8.9", value_name = "M/S,...")]
+    #[arg(
+        long = "wind",
+        conflicts_with = "winds_file",
+        value_delimiter = ',',
+        default_value = "0,3,6,8.9",
+        value_name = "M/S,..."
+    )]
     winds: Vec<f64>,
     /// Flights in each wind of every way, by which the ways are known that come down farthest.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
@@ -108,8 +114,8 @@ impl Study<'_> {
         let apogee = |impacts: &Vec<Impact>| {
             let planned = impacts.iter().filter(|impact| impact.case == Case::AsPlanned);
             let highest_m = planned.map(|impact| impact.course.highest_m);
-            let [low_m, high_m] = highest_m
-                .fold([f64::INFINITY, 0.0], |[low, high], m| [f64::min(low, m), f64::max(high, m)]);
+            let [low_m, high_m] =
+                highest_m.fold([f64::INFINITY, 0.0], |[low, high], m| [f64::min(low, m), f64::max(high, m)]);
             format!("{low_m:.0} to {high_m:.0}")
         };
         let landed = |impacts: &Vec<Impact>| {

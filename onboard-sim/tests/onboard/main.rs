@@ -10,6 +10,7 @@ mod command_card;
 mod command_fly_log;
 mod custom_vehicles;
 mod faults;
+mod field;
 mod findings;
 mod hazard;
 mod playback;

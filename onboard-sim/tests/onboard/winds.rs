@@ -80,13 +80,9 @@ fn a_file_without_units_is_refused_by_every_command() {
     std::fs::write(&bad, "height_m,speed,from_deg\n10,4,270\n").unwrap();
     let (bad, out) = (bad.to_str().unwrap(), folder.path().join("out"));
     let out = out.to_str().unwrap();
-    for command in [
-        &["fly"][..],
-        &["campaign", "--out", out],
-        &["hazard"],
-        &["card", "--out", out],
-        &["check", "mk3"],
-    ] {
+    for command in
+        [&["fly"][..], &["campaign", "--out", out], &["hazard"], &["card", "--out", out], &["check", "mk3"]]
+    {
         let refused = program(&[command, &["--winds", bad]].concat());
         let words = String::from_utf8_lossy(&refused.stderr).into_owned();
         assert!(!refused.status.success() && words.contains("bad.csv"), "{command:?} {words}");

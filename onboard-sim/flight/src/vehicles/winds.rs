@@ -26,7 +26,8 @@ pub fn read(text: &str) -> Result<Vec<Level>, TableError> {
     }
     let wanted = [("height", "m"), ("speed", "m/s"), ("from", "deg")];
     let rows = table::rows(text, &wanted, wanted.len())?;
-    let level = |row: Result<table::Row<3>, TableError>| row.map(|(_, row)| row.map(Option::unwrap_or_default));
+    let level =
+        |row: Result<table::Row<3>, TableError>| row.map(|(_, row)| row.map(Option::unwrap_or_default));
     rows.map(level).collect()
 }
 
@@ -137,7 +138,10 @@ hPa     m      C      C      %    g/kg    deg   knot     K      K      K \n\
             assert_eq!(read(text).unwrap_err().to_string(), words);
         }
         let unnamed = SOUNDING.replace("knot", "    ");
-        assert_eq!(read(&unnamed).unwrap_err().to_string(), format!("line 5: the unit of the speed is ''; {accepted}"));
+        assert_eq!(
+            read(&unnamed).unwrap_err().to_string(),
+            format!("line 5: the unit of the speed is ''; {accepted}")
+        );
         let cut = &SOUNDING[..SOUNDING.find("952.0").unwrap()];
         assert!(read(cut).unwrap_err().to_string().starts_with("line 4: the sounding is 'PRES"));
     }

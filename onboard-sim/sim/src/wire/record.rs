@@ -40,7 +40,11 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
     LogHeader {
         writer: writer.to_owned(),
         start_unix_ns,
-        run: run.into_iter().chain(field).map(|(key, value)| (key.to_owned(), value)).collect::<BTreeMap<_, _>>(),
+        run: run
+            .into_iter()
+            .chain(field)
+            .map(|(key, value)| (key.to_owned(), value))
+            .collect::<BTreeMap<_, _>>(),
         profile_toml: Some(recipe.mission_toml.clone()),
         scenario_toml: Some(recipe.dispersion_toml.clone()),
     }

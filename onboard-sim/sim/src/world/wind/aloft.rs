@@ -58,7 +58,11 @@ impl TryFrom<Vec<[f64; 3]>> for WindsAloft {
                 }
             }
             if *height_m <= below_m {
-                return refuse("height_m", *height_m, format!("above {below_m}, the height of the level before"));
+                return refuse(
+                    "height_m",
+                    *height_m,
+                    format!("above {below_m}, the height of the level before"),
+                );
             }
             below_m = *height_m;
             // World x is north and y is west.

@@ -67,7 +67,8 @@ impl Wind {
     /// the reference height stays.
     #[must_use]
     pub fn with_aloft(self, aloft: Option<&WindsAloft>) -> Self {
-        let shift_m_s = |aloft: &WindsAloft| self.along * self.reference_m_s - aloft.at_m_s(REFERENCE_HEIGHT_M);
+        let shift_m_s =
+            |aloft: &WindsAloft| self.along * self.reference_m_s - aloft.at_m_s(REFERENCE_HEIGHT_M);
         let aloft = aloft.map(|aloft| (aloft.clone(), shift_m_s(aloft)));
         Self { aloft, ..self }
     }
