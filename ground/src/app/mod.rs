@@ -20,6 +20,7 @@ pub mod stations;
 pub mod terminal;
 pub mod wire;
 
+use std::collections::BTreeMap;
 use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use std::io::IsTerminal as _;
 use std::sync::{Arc, Mutex};
@@ -37,6 +38,7 @@ use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::signing::Signing;
 use protocol::transport::LinkAddress;
+use sim::wire::field::{RUN_FACT, field_of};
 use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
@@ -147,6 +149,13 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     }
 }
 
+/// The fact about a run with the text of the mission's field.
+fn field_fact(args: &StationArgs) -> anyhow::Result<BTreeMap<String, String>> {
+    let mission = args.flags.mission.as_deref().map(load_flight).transpose()?;
+    let field = mission.and_then(|mission| mission.recipe.field);
+    Ok(field.map(|text| (RUN_FACT.to_owned(), text)).into_iter().collect())
+}
+
 async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
     let clock = Clock::start();
     let demo_options = match &args.flags.link.connect[..] {
@@ -157,6 +166,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
         // It contains both sides.
         Some(options) => options.flight.log_header("ground", clock.start_unix_ns()),
         None => LogHeader {
+            run: field_fact(args)?,
             writer: "ground".to_owned(),
             start_unix_ns: clock.start_unix_ns(),
             ..LogHeader::default()
@@ -219,6 +229,8 @@ async fn start(
     // A demonstration flies it, so it cannot fly another.
     let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
     let mission = named.map(load_flight).transpose()?;
+    let recipe = demo_options.as_ref().map(|demo| &demo.flight.recipe);
+    let field = recipe.or(mission.as_ref().map(|mission| &mission.recipe)).and_then(field_of);
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened =
@@ -255,6 +267,7 @@ async fn start(
         mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
         crew_roles: roles,
         here: config.here,
+        field,
         start_unix_s,
         demonstration: demo.is_some(),
         auto,

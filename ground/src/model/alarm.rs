@@ -51,6 +51,8 @@ pub enum AlarmKind {
     PlanOutside,
     /// The flight ended in another way than with a landing.
     NotLanded,
+    /// The crowd line crosses the fence of the mission.
+    CrowdLine,
     /// The vehicle has rebooted.
     Rebooted,
     /// Recording has failed, or records are lost.

@@ -12,6 +12,7 @@ mod command;
 mod crew;
 pub mod dead_reckoning;
 mod dialog;
+pub(crate) mod field;
 mod history;
 mod identity;
 mod link;
@@ -32,6 +33,7 @@ use std::time::Duration;
 
 use protocol::command::CommandSender;
 use protocol::dialect::{MavMessage, TdPhase, TdRole};
+use protocol::field::Field;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::record::{self, EventLevel, Record};
 use protocol::log::v1::OperatorAction;
@@ -99,6 +101,8 @@ pub struct Settings {
     /// Where the station is on the Earth; `None` if nobody has said it.
     #[serde(skip)]
     pub here: Option<Degrees>,
+    /// The lines of the field around the pad, if the mission names any.
+    pub field: Option<Field>,
     /// When the run started: seconds since 1970, UTC.
     #[serde(skip)]
     pub start_unix_s: u64,

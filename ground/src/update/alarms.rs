@@ -13,7 +13,7 @@ use super::Action;
 use crate::model::{
     Acknowledgement, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
     LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, Speaker, dead_reckoning::may_have_left,
-    foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
+    field, foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -122,7 +122,8 @@ const OF_STATION: [AlarmRow; 15] = [
 ];
 
 /// The alarms of the vehicle.
-const OF_VEHICLE: [AlarmRow; 14] = [
+const OF_VEHICLE: [AlarmRow; 15] = [
+    of_boot(AlarmKind::CrowdLine, VEHICLE, |model, _| field::crowd_inside_fence(model)),
     of_run(AlarmKind::Rebooted, VEHICLE, |model, now| {
         let shown = |at: Duration| now.saturating_sub(at) < REBOOT_SHOWN || model.vehicle.reset_in_flight;
         let (did, _) = model.rebooted.filter(|(_, at)| shown(*at))?;

@@ -11,6 +11,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Wrap, canvas};
 
 use super::{Room, columns, flight, framed, rows};
+use crate::model::field;
 use crate::model::{
     Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
     Way, dead_reckoning::may_have_left, shown, standing, words,
@@ -316,6 +317,8 @@ fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line
         Line::from(format!("  north {north_m} m, east {east_m} m")),
         Line::from(theme.either_side(&format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0)))),
     ];
+    let [distances, _] = field::distances(model, (spot.east_m, spot.north_m));
+    lines.extend((!distances.is_empty()).then(|| Line::from(format!("  {distances}"))));
     lines.extend(degrees(place.degrees(spot)));
     lines
 }

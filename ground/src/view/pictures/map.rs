@@ -8,9 +8,10 @@ use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::widgets::canvas::Circle;
 
+use super::field::draw_lines;
 use super::{DOTS_ACROSS, Ink, Plane, TextRole, Theme, circle};
 use crate::model::{
-    Model, Spot, dead_reckoning::predict_position, is_burning, is_on_pad, quantity::Quantity,
+    Model, Spot, dead_reckoning::predict_position, field, is_burning, is_on_pad, quantity::Quantity,
 };
 use crate::view::{fixed, shortest, widgets};
 
@@ -147,12 +148,14 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             attitude.axes[0].map(|part| 0.4 * reach_m * part / libm::sin(attitude.tilt_rad));
         ((east, north), attitude.tilt_rad.to_degrees())
     });
+    let lines = field::lines_m(model);
     let error = lost.map(|at| circle((at.east_m, at.north_m), at.error_m));
     plane.draw(theme, frame, |context| {
         if let Some(fence_m) = fence_m {
             let (x, y, color) = (0.0, 0.0, theme.ink(Ink::Limit));
             context.draw(&Circle { x, y, radius: fence_m, color });
         }
+        draw_lines(context, &lines, theme);
         plane.measured(context, &flown, theme.ink(Ink::Measured));
         for dotted in [&spread, &error].into_iter().flatten() {
             plane.predicted(context, dotted, theme.ink(Ink::Predicted));
@@ -187,6 +190,11 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         plane.write(frame, (beside(x / 2.0), y / 2.0), &words, strong);
     }
     words(model, (fence_m, per_dot), theme, frame, &plane);
+    let measured = stands.or(lost.map(|at| (at.east_m, at.north_m))).or(impact);
+    if let Some(at) = measured.or(down.map(|at| (at.east_m, at.north_m))) {
+        let [complete, crowd] = field::distances(model, at);
+        plane.beside(frame, at, &[complete, crowd], theme.style(TextRole::Label));
+    }
     let label = |frame: &mut Frame, at, words: &str| {
         plane.beside(frame, at, &[words.to_owned()], theme.style(TextRole::Label));
     };

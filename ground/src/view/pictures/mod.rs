@@ -5,6 +5,7 @@
 //! so that no dot hides a letter.
 
 pub mod attitude;
+mod field;
 pub mod height;
 pub mod map;
 pub mod qr;
