@@ -15,4 +15,6 @@ mod findings;
 mod hazard;
 mod playback;
 mod site;
+mod trial;
+mod trials;
 mod unbraked;

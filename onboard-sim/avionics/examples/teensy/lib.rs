@@ -306,6 +306,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             booster_attached: low(&mut self.parts.booster),
             pin_out: high(&mut self.parts.pin),
             battery_v: self.parts.chip.battery_v(),
+            servo_battery_v: None,
             log: self.parts.chip.log(),
             uplink,
             commander,
