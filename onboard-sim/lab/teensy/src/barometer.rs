@@ -81,7 +81,7 @@ impl Coefficients {
     pub(crate) fn of(bytes: &[u8; 21]) -> Self {
         let unsigned = |at: usize| f64::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
         let signed = |at: usize| f64::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]));
-        let byte = |at: usize| f64::from(bytes[at] as i8);
+        let byte = |at: usize| f64::from(bytes[at].cast_signed());
         let scaled = |value: f64, exponent: i32| libm::ldexp(value, -exponent);
         Self {
             t: [scaled(unsigned(0), -8), scaled(unsigned(2), 30), scaled(byte(4), 48)],

@@ -27,7 +27,7 @@ pub fn head(name: &str, mission_toml: &str, start: &ComputerStart) -> Result<Vec
     };
     let mut bytes = Cursor::new(Vec::new());
     let mut writer = LogWriter::new(&mut bytes, &header)?;
-    writer.write(&Record::ComputerStart(Box::new(start.clone())), 0)?;
+    writer.write(&Record::ComputerStart(Box::new(*start)), 0)?;
     writer.flush()?;
     // The writer ends the log when it goes out of scope: everything behind this is left out.
     let length = writer.finish()?.position();

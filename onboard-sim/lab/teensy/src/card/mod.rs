@@ -136,6 +136,7 @@ impl<D: BlockDevice, T: TimeSource> CardLog<D, T> {
             self.pending.resize(self.pending.len() + length, 0);
         }
         self.pending.extend(MAGIC);
+        self.state.space_bytes = self.state.space_bytes.saturating_sub(self.pending.len() as u64);
         let ended = card.write(file, &self.pending).and_then(|()| card.close_file(file));
         self.pending.clear();
         self.state.running = false;
@@ -146,14 +147,13 @@ impl<D: BlockDevice, T: TimeSource> CardLog<D, T> {
 
     fn written(&mut self, ring: &mut Consumer<'_, u8>) -> Result<(), Error<D::Error>> {
         let Some(card) = &self.card else { return Ok(()) };
-        let file = match self.file {
-            Some(file) => file,
-            None => {
-                let (file, space_bytes) = begun(card)?;
-                (self.sequence, self.unflushed) = (0, 0);
-                self.state = LogState { running: true, space_bytes };
-                *self.file.insert(file)
-            }
+        let file = if let Some(file) = self.file {
+            file
+        } else {
+            let (file, space_bytes) = begun(card)?;
+            (self.sequence, self.unflushed) = (0, 0);
+            self.state = LogState { running: true, space_bytes };
+            *self.file.insert(file)
         };
         while ring.len() >= PREFIX_BYTES {
             self.take(ring);
