@@ -96,8 +96,9 @@ impl Surroundings {
             left -= self.world.stride(&self.actuators, left);
             measured = self.sensors.observe(&SensorTruth::of(&self.world)).or(measured);
         }
-        let energised =
-            [self.actuators.ignite, self.actuators.ignite_booster].into_iter().filter(|on| *on).count();
+        // Each igniter of the landing motor has its current.
+        let landing = if self.actuators.ignite { self.world.airframe().igniters } else { 0 };
+        let energised = landing as usize + usize::from(self.actuators.ignite_booster);
         self.battery.step(surfaces_rad(&self.world), energised, FRAME_S);
         self.measured = measured.map(|measured| self.faults.distort(&measured));
         self.measured
@@ -117,6 +118,7 @@ impl Surroundings {
             igniter_continuity: self.sensors.igniter_continuity(),
             booster_attached: self.world.booster_attached(),
             battery_v: Some(self.battery.volts()),
+            servo_battery_v: Some(self.battery.servo_volts()),
             ..SensedInput::default()
         }
     }

@@ -18,6 +18,8 @@ mod hazard;
 mod missions;
 mod playback;
 mod site;
+mod trial;
+mod trials;
 mod unbraked;
 mod winds;
 

@@ -95,7 +95,12 @@ impl Crewed {
             name: &self.name,
             operators: &[],
             findings: &self.findings,
-            battery: input.battery_v.map(|volts| BatteryFacts { volts, current_a: None, left: None }),
+            battery: input.battery_v.map(|volts| BatteryFacts {
+                volts,
+                servo_volts: input.servo_battery_v,
+                current_a: None,
+                left: None,
+            }),
             rehearsed: None,
             parachute_ejected: self.parachute_ejected,
             judged: None,

@@ -67,10 +67,12 @@ impl MissionName {
     }
 }
 
-/// The battery.
+/// The flight computer's pack, and the voltage of the other one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatteryFacts {
     pub volts: f64,
+    /// Of the pack of servos and igniters, V; `None` where it is not measured.
+    pub servo_volts: Option<f64>,
     /// `None` where it is not measured.
     pub current_a: Option<f64>,
     /// Remaining charge, 0 to 1; `None` if not available.

@@ -301,6 +301,7 @@ mod tests {
                 igniter_continuity: flags[2],
                 pin_out: flags[3],
                 battery_v: flags[7].then_some(number(17)),
+                servo_battery_v: flags[0].then_some(number(8)),
                 log: LogState { running: flags[4], space_bytes },
                 uplink,
                 commander: commander.map(|(station, by)| Commander {

@@ -449,8 +449,10 @@ pub struct SensedInput {
     /// The wire between booster and vehicle is intact.
     pub booster_attached: bool,
     pub pin_out: bool,
-    /// Voltage of the battery, V; `None` if it is not measured.
+    /// Voltage of the flight computer's pack, V; `None` if it is not measured.
     pub battery_v: Option<f64>,
+    /// Voltage of the pack of servos and igniters, V; `None` if it is not measured, or the same.
+    pub servo_battery_v: Option<f64>,
     pub log: LogState,
     /// The uplink of the station with the newest heartbeat.
     pub uplink: Uplink,

@@ -287,6 +287,7 @@ impl Computer {
             log_running: self.input.log.running,
             log_space_bytes: self.input.log.space_bytes,
             battery_v: self.input.battery_v,
+            servo_battery_v: self.input.servo_battery_v,
             controller_warm,
             controller_found,
             predicted_landing,

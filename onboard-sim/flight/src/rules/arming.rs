@@ -75,8 +75,10 @@ pub struct ArmingInput {
     pub log_running: bool,
     /// Free space for the log, bytes.
     pub log_space_bytes: u64,
-    /// Voltage of the battery, V; `None` if it is not measured.
+    /// Voltage of the flight computer's pack, V; `None` if it is not measured.
     pub battery_v: Option<f64>,
+    /// The same of the pack of servos and igniters.
+    pub servo_battery_v: Option<f64>,
     /// The rehearsal of the landing found plans and landed.
     pub controller_warm: bool,
     /// The rehearsal's outcome as text.
@@ -138,7 +140,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         },
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),
-        battery(limits, input.battery_v),
+        battery(limits, input.battery_v, input.servo_battery_v),
     ]);
     if let Some(height_m) = input.hanging_m {
         checks.push(Check {
@@ -182,7 +184,15 @@ fn fins_answering(input: &ArmingInput) -> Check {
     Check { name: "fins answering", passed, found, required }
 }
 
-fn battery(limits: &ArmingLimits, battery_v: Option<f64>) -> Check {
+/// The computer's pack, unless the other one alone is too low: that is found on its own limit.
+fn battery(limits: &ArmingLimits, battery_v: Option<f64>, servo_battery_v: Option<f64>) -> Check {
+    let too_low = |volts: &f64| volts.is_nan() || *volts < limits.servo_battery_min_v;
+    if let Some(volts) = servo_battery_v.filter(too_low)
+        && battery_v.is_none_or(|volts| volts >= limits.battery_min_v)
+    {
+        let required = format!("at least {:.1} V", limits.servo_battery_min_v);
+        return Check { name: "battery", passed: false, found: format!("servos {volts:.2} V"), required };
+    }
     let required = format!("at least {:.1} V", limits.battery_min_v);
     let (passed, found) = match battery_v {
         None => (true, "not measured".to_owned()),
@@ -285,6 +295,7 @@ mod tests {
             log_running: true,
             log_space_bytes: 1 << 30,
             battery_v: Some(ArmingLimits::default().battery_min_v),
+            servo_battery_v: Some(ArmingLimits::default().servo_battery_min_v),
             controller_warm: true,
             controller_found: "converged".to_owned(),
             predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
@@ -307,7 +318,7 @@ mod tests {
 
     #[test]
     fn each_check_alone_refuses_and_reports_its_name_and_value() {
-        let spoilings: [Spoiling; 24] = [
+        let spoilings: [Spoiling; 26] = [
             ("fins answering: found servos that tell nothing, seen by 1, required 2 people", |input| {
                 input.seers = Some(1);
             }),
@@ -361,6 +372,12 @@ mod tests {
             }),
             ("battery: found 7.39 V, required at least 7.4 V", |input| {
                 input.battery_v = Some(7.39);
+            }),
+            ("battery: found servos 11.09 V, required at least 11.1 V", |input| {
+                input.servo_battery_v = Some(11.09);
+            }),
+            ("battery: found servos NaN V", |input| {
+                input.servo_battery_v = Some(f64::NAN);
             }),
             ("battery: found NaN V", |input| {
                 input.battery_v = Some(f64::NAN);

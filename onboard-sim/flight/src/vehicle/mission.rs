@@ -191,12 +191,15 @@ with_defaults! {
         pub speed_max_m_s: f64 = 0.2,
         /// Smallest free log space, bytes.
         pub log_space_min_bytes: u64 = 64 << 20,
-        /// Lowest voltage of the battery, V. The default is for two lithium-polymer cells: 3.7 V a
-        /// cell at light load is about a seventh of the charge, a quarter of an hour of the
-        /// simulated vehicle (1 Ah, 0.5 A), and 0.8 V above the 6.6 V at which common 5 V
-        /// regulators give up; six moving servos and an igniter take 0.65 V of that (9.2 A through
-        /// 70 mohm).
+        /// Lowest voltage of the flight computer's pack, V. The default is for two
+        /// lithium-polymer cells: 3.7 V a cell at light load is about a seventh of the charge, a
+        /// quarter of an hour of the simulated vehicle (1 Ah, 0.35 A), and 0.8 V above the 6.6 V at
+        /// which common 5 V regulators give up.
         pub battery_min_v: f64 = 7.4,
+        /// Lowest voltage of the pack of servos and igniters, V. The default is for three such
+        /// cells: six moving servos and two igniters take 1.4 V of it (14.2 A through 0.1 ohm),
+        /// which leaves 1.3 V above the 8.4 V that a regulator for servos of 7.4 V needs.
+        pub servo_battery_min_v: f64 = 11.1,
     }
 }
 

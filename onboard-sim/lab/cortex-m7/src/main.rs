@@ -4,7 +4,12 @@
 #[cfg(not(target_os = "none"))]
 mod hosted;
 #[cfg(target_os = "none")]
+extern crate alloc;
+
+#[cfg(target_os = "none")]
 mod m7;
+#[cfg(target_os = "none")]
+mod storm;
 
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {

@@ -22,7 +22,8 @@ pub(crate) struct Servo {
     stops_rad: (f64, f64),
     horn_rad: f64,
     load_rad: f64,
-    stuck: bool,
+    /// Steps for which it does not move; the largest number is for ever.
+    stuck_steps: u64,
     /// Where it runs to and stays, whatever is commanded.
     jams_at_rad: Option<f64>,
 }
@@ -41,7 +42,7 @@ impl Servo {
             stops_rad,
             horn_rad: at_rad,
             load_rad: at_rad,
-            stuck: false,
+            stuck_steps: 0,
             jams_at_rad: None,
         }
     }
@@ -71,7 +72,8 @@ impl Servo {
         self.line_rad[self.next] = if command_rad.is_nan() { last_rad } else { command_rad };
         let delayed_rad = self.line_rad[(self.next + LINE_STEPS - self.delay_steps) % LINE_STEPS];
         self.next = (self.next + 1) % LINE_STEPS;
-        if self.stuck {
+        if self.stuck_steps > 0 {
+            self.stuck_steps -= u64::from(self.stuck_steps < u64::MAX);
             return;
         }
         let (low_rad, high_rad) = self.stops_rad;
@@ -89,7 +91,17 @@ impl Servo {
 
     /// The servo is stuck from now on.
     pub(crate) fn stick(&mut self) {
-        self.stuck = true;
+        self.stuck_steps = u64::MAX;
+    }
+
+    /// The servo has no power for so many steps, and stays where it is.
+    pub(crate) fn rest(&mut self, steps: u64) {
+        self.stuck_steps = self.stuck_steps.max(steps);
+    }
+
+    /// Whether its pack gives current.
+    pub(crate) fn has_power(&self) -> bool {
+        self.stuck_steps == 0 || self.stuck_steps == u64::MAX
     }
 
     /// The servo runs to an angle, rad, from now on, and stays there.
@@ -189,6 +201,17 @@ mod tests {
         let at_rad = after(&mut servo, 0.05, 1);
         servo.stick();
         assert!((after(&mut servo, -0.1, 50) - at_rad).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_servo_without_power_stays_and_follows_again() {
+        let mut servo = servo(0.0, 1.0_f64.to_degrees(), 0.0);
+        servo.rest(50);
+        assert!(after(&mut servo, 0.05, 50).abs() < 1e-15);
+        assert!((after(&mut servo, 0.05, 20) - 0.020).abs() < 1e-12);
+        servo.stick();
+        servo.rest(50);
+        assert!((after(&mut servo, -0.1, 200) - 0.020).abs() < 1e-12, "stuck for ever");
     }
 
     #[test]

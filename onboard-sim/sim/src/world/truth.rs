@@ -193,6 +193,12 @@ pub enum Fault {
         /// The angle, degrees; beyond the stop it is the stop.
         deg: f64,
     },
+    /// The pack of servos and igniters gives no current: all surfaces stay where they are, and no
+    /// igniter and no charge fires.
+    BrownOut {
+        /// Until the servos follow again, s.
+        lasts_s: f64,
+    },
     /// The gimbal servos turn slowly.
     GimbalSlow {
         /// Rate, as a fraction of the rate without the fault.

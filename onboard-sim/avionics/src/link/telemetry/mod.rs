@@ -307,16 +307,24 @@ fn characters<const N: usize>(text: &str) -> CharArray<N> {
 
 /// mV, cA and percent of the battery; `UINT16_MAX`, -1 and -1: not available.
 fn figures(state: &VehicleState<'_>) -> (u16, i16, i8) {
-    let Some(BatteryFacts { volts, current_a, left }) = state.battery else { return (u16::MAX, -1, -1) };
+    let Some(BatteryFacts { volts, current_a, left, .. }) = state.battery else { return (u16::MAX, -1, -1) };
     let hundred = |value: Option<f64>| value.map_or(-1.0, |value| libm::round(100.0 * value));
     (libm::round(1000.0 * volts) as u16, hundred(current_a) as i16, hundred(left) as i8)
 }
 
+/// Instance 0, the flight computer's pack; in every other second instance 1, that of servos and
+/// igniters, if it is measured.
 fn battery(state: &VehicleState<'_>) -> MavMessage {
     let mut voltages = [u16::MAX; 10];
-    let (millivolts, current_battery, battery_remaining) = figures(state);
+    let servos = state.battery.and_then(|battery| battery.servo_volts);
+    let servos = servos.filter(|_| libm::floor(state.time_s) % 2.0 > 0.5);
+    let (millivolts, current_battery, battery_remaining) = match servos {
+        Some(volts) => (libm::round(1000.0 * volts) as u16, -1, -1),
+        None => figures(state),
+    };
     voltages[0] = millivolts;
     MavMessage::BATTERY_STATUS(BATTERY_STATUS_DATA {
+        id: u8::from(servos.is_some()),
         temperature: i16::MAX,
         voltages,
         current_battery,

@@ -103,8 +103,8 @@ record!(Estimate as flight_v1::Estimate {
     motor, barometer, gnss_velocity, gnss_position, lidar, wind
 });
 record!(SensedInput as computer_v1::ComputerInput {
-    frame, time_s, measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, pin_out, battery_v, log,
-    uplink, commander, people;
+    frame, time_s, measured, gimbal_rad, fins_rad, contact, igniter_continuity, booster_attached, pin_out, battery_v, servo_battery_v,
+    log, uplink, commander, people;
     requests, rehearsed, plan_ready
 });
 record!(LogState as computer_v1::LogState { running, space_bytes });

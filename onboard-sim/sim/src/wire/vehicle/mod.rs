@@ -188,6 +188,7 @@ impl Vehicle {
             findings: &self.findings,
             battery: Some(BatteryFacts {
                 volts: battery.volts(),
+                servo_volts: Some(battery.servo_volts()),
                 current_a: Some(battery.current_a()),
                 left: Some(battery.charge()),
             }),

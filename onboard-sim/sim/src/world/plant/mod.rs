@@ -294,6 +294,10 @@ impl World {
             | Fault::WeakMotor { .. }
             | Fault::EarlyBurnout { .. } => self.motor.break_down(fault),
             Fault::GimbalStuck => self.gimbal.iter_mut().for_each(Servo::stick),
+            Fault::BrownOut { lasts_s } => {
+                let steps = libm::round(lasts_s / STEP_S) as u64;
+                self.gimbal.iter_mut().chain(&mut self.fins).for_each(|servo| servo.rest(steps));
+            }
             Fault::GimbalJams { deg } => self.gimbal[0].jam(deg.to_radians()),
             Fault::GimbalSlow { scale } => self.gimbal.iter_mut().for_each(|servo| servo.slow(scale)),
             Fault::FinStuck { fin } => {
@@ -329,6 +333,7 @@ impl World {
 
     fn command(&mut self, actuators: &Actuators, time_s: f64) {
         let before_rad = self.gimbal_rad();
+        let powered = self.gimbal.iter().all(Servo::has_power);
         let wired_rad = self.wired_rad(actuators);
         let gimbal = self.gimbal.iter_mut().zip(&mut self.gimbal_links);
         let surfaces = gimbal.chain(self.fins.iter_mut().zip(&mut self.fin_links));
@@ -339,12 +344,13 @@ impl World {
         let now_rad = self.gimbal_rad();
         let rates_rad_s = [0, 1].map(|axis: usize| (now_rad[axis] - before_rad[axis]) / STEP_S);
         self.gimbal_rates_rad_s = [self.gimbal_rates_rad_s[1], rates_rad_s];
-        self.motor.current(actuators.ignite, time_s);
-        if actuators.parachute {
+        self.motor.current(actuators.ignite && powered, time_s);
+        if actuators.parachute && powered {
             self.parachute.eject(time_s);
         }
         if let Some(stack) = &mut self.stack {
-            stack.command(actuators.ignite_booster, actuators.separate, time_s);
+            let Actuators { ignite_booster, separate, .. } = *actuators;
+            stack.command(ignite_booster && powered, separate && powered, time_s);
         }
     }
 

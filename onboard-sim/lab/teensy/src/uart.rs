@@ -27,19 +27,17 @@ impl<const N: usize> Framer<N> {
         (self.have == 0).then_some(&self.frame)
     }
 
-    /// Reads received bytes, without waiting; returns the last frame with content.
-    pub(crate) fn newest<T>(
-        &mut self,
-        uart: &mut (impl Read + ReadReady),
-        read: impl Fn(&[u8; N]) -> Option<T>,
-    ) -> Option<T> {
-        let (mut bytes, mut newest) = ([0; 64], None);
-        while matches!(uart.read_ready(), Ok(true)) {
-            let Ok(count @ 1..) = uart.read(&mut bytes) else { break };
-            for byte in &bytes[..count] {
-                newest = self.take(*byte).and_then(&read).or(newest);
-            }
-        }
-        newest
+    /// The last frame with content among received bytes.
+    pub(crate) fn newest<T>(&mut self, bytes: &[u8], read: impl Fn(&[u8; N]) -> Option<T>) -> Option<T> {
+        bytes.iter().fold(None, |newest, byte| self.take(*byte).and_then(&read).or(newest))
+    }
+}
+
+/// Gives received bytes to `take`, without waiting for more.
+pub(crate) fn each(uart: &mut (impl Read + ReadReady), mut take: impl FnMut(&[u8])) {
+    let mut bytes = [0; 64];
+    while matches!(uart.read_ready(), Ok(true)) {
+        let Ok(count @ 1..) = uart.read(&mut bytes) else { break };
+        take(&bytes[..count]);
     }
 }

@@ -1,16 +1,19 @@
-//! An example: the flight computer's board as a student club would wire it, around a Teensy 4.1.
-//! It has never flown.
+//! The flight computer's board as a student club would wire it, around a Teensy 4.1. It has never
+//! flown.
 //!
 //! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs
-//! on a desk, too: `tests.rs` puts simulated devices in the place of the real ones. What a program
-//! for the chip adds is a [`Wiring`], a [`Chip`], an entry and a heap (`../../src/m7.rs`), and a
-//! timer that calls [`tick`] every 5 ms. `README.md` has pins and parts.
-#![cfg_attr(not(test), no_std)]
+//! on a desk, too: `tests.rs` puts simulated devices in the place of the real ones. The image
+//! (`chip.rs`) adds a [`Wiring`], a [`Chip`], an entry, a heap, and a timer that calls [`tick`]
+//! every 5 ms. `README.md` has pins and parts.
+#![cfg_attr(target_os = "none", no_std)]
 
 extern crate alloc;
 
 mod barometer;
+pub mod card;
 mod gnss;
+#[cfg(not(target_os = "none"))]
+mod head;
 mod imu;
 mod lidar;
 mod saved;
@@ -30,7 +33,7 @@ use embedded_hal::digital::{InputPin, OutputPin, PinState};
 use embedded_hal::i2c::I2c;
 use embedded_hal::pwm::SetDutyCycle;
 use embedded_hal::spi::SpiDevice;
-use embedded_io::{Read, ReadReady};
+use embedded_io::{Read, ReadReady, Write};
 use flight::computer::messages::CrewMessage;
 use flight::computer::pad_check::surfaces_rad;
 use flight::computer::pilot::planner::Planner;
@@ -38,12 +41,17 @@ use flight::computer::{Commands, Computer, FRAME_S, LogState, SensedInput, fligh
 use flight::estimation::estimator::{GnssFix, ImuSample, Measurements};
 use flight::rules::outputs::PyroOutput;
 use flight::vehicle::atmosphere::{Air, pressure_altitude_m};
+use flight::vehicle::mission::Mission;
+use flight::vehicle::rigid::RigidState;
+use flight::vehicles::mission::{BUILTIN, builtin};
 use nalgebra::Vector3;
 use prost::Message as _;
 use protocol::motion::Degrees;
 use protocol::records::computer_v1::ComputerFrame;
 
 pub use self::barometer::Barometer;
+#[cfg(not(target_os = "none"))]
+pub use self::head::head;
 pub use self::saved::MOST_BYTES;
 use self::saved::{Record, Zero};
 pub use self::servo::Surface;
@@ -53,7 +61,7 @@ use self::uart::Framer;
 pub trait Wiring {
     type Imu: SpiDevice;
     type Barometer: I2c;
-    type Gnss: Read + ReadReady;
+    type Gnss: Read + ReadReady + Write;
     type Lidar: Read + ReadReady;
     type Servo: SetDutyCycle;
     type Output: OutputPin;
@@ -75,14 +83,15 @@ pub trait Chip {
     /// Sends messages to the crew.
     fn send(&mut self, messages: &[CrewMessage]);
 
-    /// Puts a record into the ring from which the main context writes the log.
-    fn append(&mut self, record: &[u8]);
+    /// Puts the record of a frame into the ring from which the main context writes the log
+    /// ([`card::Appender`]).
+    fn append(&mut self, frame: u64, record: &[u8]);
 
     /// Whether the ring has never been full, and the space behind it.
     fn log(&self) -> LogState;
 
-    /// Voltage of the battery, V, if it is measured.
-    fn battery_v(&mut self) -> Option<f64>;
+    /// Voltage of the pack, V, if it is measured: the computer's, and that of servos and igniters.
+    fn batteries_v(&mut self) -> [Option<f64>; 2];
 
     /// A clock that runs through a reset and never goes back, s.
     fn clock_s(&mut self) -> f64;
@@ -155,7 +164,15 @@ pub enum Trouble {
     Part(&'static str),
     #[error("the inertial unit calls itself {0:#04x}; 0x47, an ICM-42688-P, is accepted")]
     AnotherImu(u8),
+    #[error("the barometer calls itself {0:#04x}; 0x60, a BMP390, is accepted")]
+    AnotherBarometer(u8),
 }
+
+/// Longest record of a frame, bytes: 250 as a rule, and some kB with the rehearsal and requests.
+const MOST_RECORD_BYTES: usize = 8 * 1024;
+
+/// Frames between requests for the receiver's mode, until it is confirmed: a second.
+const AIRBORNE_FRAMES: u64 = 200;
 
 /// Samples that make the zero of the height, one second, and of the place, two seconds.
 const ZERO_HEIGHTS: u32 = 50;
@@ -170,6 +187,10 @@ pub struct TeensyBoard<W: Wiring> {
     parts: Parts<W>,
     build: Build,
     gnss: Framer<{ gnss::FRAME_BYTES }>,
+    /// The receiver's answers about its dynamic model, and whether the last one was: airborne.
+    model: Framer<{ gnss::MODEL_BYTES }>,
+    airborne: bool,
+    unconfirmed_frames: u64,
     lidar: Framer<{ lidar::FRAME_BYTES }>,
     pad: Degrees,
     /// Air temperature at the pad, in the shade, K: warm air is taller. An error of 3 K makes every
@@ -181,6 +202,21 @@ pub struct TeensyBoard<W: Wiring> {
     place: Zero,
     frame: u64,
     released_at: u64,
+}
+
+/// Text and content of a built-in mission, flown with servos that report nothing.
+pub fn mission(name: &str) -> Option<(&'static str, Mission)> {
+    let (_, toml) = BUILTIN.iter().find(|(available, _)| *available == name)?;
+    let mut mission = builtin(name)?.ok()?;
+    mission.airframe.servos_tell = false;
+    Some((toml, mission))
+}
+
+/// The computer at power-up. It assumes that its rail is as in the drawing.
+pub fn at_power_up(mission: &Mission) -> Computer {
+    let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
+    let standing = mission.launched().map(|launch| launch.standing(cg_station_m));
+    Computer::at_power_up(mission, &standing.unwrap_or_else(|| RigidState::upright(cg_station_m)))
 }
 
 /// Starts board and frames at power-up, and resumes after a reset. `computer` is one at power-up.
@@ -226,6 +262,9 @@ pub fn start<W: Wiring>(
         parts,
         build,
         gnss,
+        model: Framer::new(gnss::MODEL_HEAD),
+        airborne: false,
+        unconfirmed_frames: 0,
         lidar,
         pad: Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg },
         air_k: site.air_at_m(0.0).temperature_k,
@@ -263,9 +302,22 @@ impl<W: Wiring> TeensyBoard<W> {
             let standard_k = Air::at_geopotential_m(height_m - above_m).temperature_k;
             Some(self.stands_m.z + above_m * self.air_k / standard_k)
         });
-        let lidar_range_m = self.lidar.newest(&mut parts.lidar, lidar::range_m);
-        let fix = self.gnss.newest(&mut parts.gnss, gnss::fix);
-        let gnss = fix.and_then(|fix| self.located(&fix));
+        let (mut lidar_range_m, mut fix) = (None, None);
+        uart::each(&mut parts.lidar, |bytes| {
+            lidar_range_m = self.lidar.newest(bytes, lidar::range_m).or(lidar_range_m);
+        });
+        uart::each(&mut parts.gnss, |bytes| {
+            self.airborne = self.model.newest(bytes, gnss::is_airborne).unwrap_or(self.airborne);
+            fix = self.gnss.newest(bytes, gnss::fix).or(fix);
+        });
+        if !self.airborne {
+            if self.unconfirmed_frames.is_multiple_of(AIRBORNE_FRAMES) {
+                gnss::request_airborne(&mut parts.gnss);
+            }
+            self.unconfirmed_frames += 1;
+        }
+        // A receiver in another mode is silent: nothing is armed without it.
+        let gnss = fix.filter(|_| self.airborne).and_then(|fix| self.located(&fix));
         Measurements { imu, pressure_altitude_m, gnss, lidar_range_m }
     }
 
@@ -294,6 +346,7 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         // A switch that cannot be read counts as: no contact, no igniter, no booster, pin in.
         let high = |switch: &mut W::Switch| switch.is_high().unwrap_or(false);
         let low = |switch: &mut W::Switch| switch.is_low().unwrap_or(false);
+        let [battery_v, servo_battery_v] = self.parts.chip.batteries_v();
         let sensed = SensedInput {
             frame: 0,
             time_s: 0.0,
@@ -305,7 +358,8 @@ impl<W: Wiring> Board for TeensyBoard<W> {
             igniter_continuity: self.parts.igniters.iter_mut().all(high),
             booster_attached: low(&mut self.parts.booster),
             pin_out: high(&mut self.parts.pin),
-            battery_v: self.parts.chip.battery_v(),
+            battery_v,
+            servo_battery_v,
             log: self.parts.chip.log(),
             uplink,
             commander,
@@ -346,7 +400,12 @@ impl<W: Wiring> Board for TeensyBoard<W> {
         if frame.output.released {
             self.released_at = self.frame;
         }
-        self.parts.chip.append(&frame.encode_length_delimited_to_vec());
+        let mut bytes = [0; MOST_RECORD_BYTES];
+        let mut room = &mut bytes[..];
+        // A longer record than there can be is appended empty, which a replay reports.
+        let fits = frame.encode(&mut room).is_ok();
+        let left = if fits { room.len() } else { MOST_RECORD_BYTES };
+        self.parts.chip.append(self.frame, &bytes[..MOST_RECORD_BYTES - left]);
     }
 }
 

@@ -15,7 +15,7 @@ use flight::computer::pad_check::CheckState;
 use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2};
 use flight::rules::arming::Uplink;
 use flight::rules::phase::Phase;
-use flight::vehicle::mission::{Mission, StartPoint};
+use flight::vehicle::mission::StartPoint;
 use flight::vehicle::site::Site;
 use prost::bytes::Buf;
 use protocol::motion::Degrees;
@@ -27,39 +27,21 @@ use sim::world::{Actuators, RestOutcome, World};
 
 use super::*;
 
-/// The coefficients of the MS5611's data sheet (page 8), with the checksum that belongs to them.
-const PROM: [u16; 8] = [0, 40_127, 36_924, 23_317, 23_282, 33_464, 28_312, 0];
-const TEMPERATURE_RAW: u32 = 8_569_150;
+/// Registers from 0x31 on of a sensor, and its raw pressure and temperature, as the crate `bmp390`
+/// 0.5.0-alpha.1 has them in its tests (`test_utils.rs`), and the values that it expects.
+const COEFFICIENTS: [u8; 21] = [
+    0x98, 0x6c, 0xa9, 0x4a, 0xf9, 0xe3, 0x1c, 0x61, 0x16, 0x06, 0x01, 0x51, 0x4a, 0xde, 0x5d, 0x03, 0xfa,
+    0xf9, 0x0e, 0x06, 0xf5,
+];
+const TEMPERATURE_RAW: u32 = 0x0082_bad1;
 
 #[test]
-fn val_datasheet_ms5611_worked_example() {
-    let (temperature, pressure_pa) = barometer::compensated(&PROM, 9_085_466, TEMPERATURE_RAW);
-    assert_eq!((temperature, pressure_pa.floor()), (2007, 100_009.0));
-}
-
-/// The same coefficients and -10.00 degrees before the second order, put into the formulas of
-/// page 9.
-#[test]
-fn val_hand_ms5611_in_the_cold() {
-    let [_, c1, c2, c3, c4, c5, c6, _] = PROM.map(f64::from);
-    let (d1, d2) = (8_000_000.0, (c5 * 256.0 - 3_000.0 * 8_388_608.0 / c6).round());
-    let difference = d2 - c5 * 256.0;
-    let temperature = (2000.0 + difference * c6 / 8_388_608.0).floor();
-    let cold = (temperature - 2000.0) * (temperature - 2000.0);
-    let offset = c2 * 65_536.0 + c4 * difference / 128.0 - 2.5 * cold;
-    let sensitivity = c1 * 32_768.0 + c3 * difference / 256.0 - 1.25 * cold;
-    let expected_pa = (d1 * sensitivity / 2_097_152.0 - offset) / 32_768.0;
-    let (found, found_pa) = barometer::compensated(&PROM, d1 as u32, d2 as u32);
-    assert!((found as f64 - (temperature - difference * difference / 2_147_483_648.0)).abs() <= 1.0);
-    assert!((found_pa - expected_pa).abs() < 0.01, "{found_pa} {expected_pa}");
-}
-
-/// AN520, its example.
-#[test]
-fn val_datasheet_ms5611_checksum() {
-    let prom = [0x3132, 0x3334, 0x3536, 0x3738, 0x3940, 0x4142, 0x4344, 0x4500];
-    assert_eq!(barometer::crc4(&prom), 0xB);
-    assert_eq!(barometer::crc4(&[0x3132, 0x3334, 0x3536, 0x3738, 0x3940, 0x4142, 0x4344, 0x450B]), 0xB);
+fn val_bmp390_crate_recorded_bytes() {
+    let coefficients = barometer::Coefficients::of(&COEFFICIENTS);
+    let (temperature_c, pressure_pa) = coefficients.compensated(0x006b_b3cb, TEMPERATURE_RAW);
+    // The crate computes in single precision.
+    assert!((temperature_c - 25.770_746).abs() < 1e-4, "{temperature_c}");
+    assert!((pressure_pa - 98_370.55).abs() < 0.1, "{pressure_pa}");
 }
 
 /// 1 g are 2,048 counts and 100 deg/s are 1,640, high byte first.
@@ -131,6 +113,66 @@ fn val_datasheet_nav_pvt() {
         assert_eq!(parsed(&broken), [], "byte {place}");
     }
     assert_eq!(parsed(&nav_pvt([353_470_000, -1_178_090_000], 612_345, [0; 3], false)), [], "no fix");
+}
+
+/// Bytes written to a receiver.
+struct Wire(Vec<u8>);
+
+impl embedded_io::ErrorType for Wire {
+    type Error = Infallible;
+}
+
+impl Write for Wire {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        self.0.extend(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+/// The crate `ublox` writes the same settings, and reads the same frame.
+#[test]
+fn val_ublox_crate_writes_and_reads_the_same() {
+    use ublox::cfg_val::{CfgKey, CfgVal};
+    use ublox::packets::cfg_nav5::NavDynamicModel;
+    use ublox::packets::cfg_val::{CfgLayerGet, CfgLayerSet, CfgValGetRequestBuilder, CfgValSetBuilder};
+    use ublox::proto33::PacketRef;
+    use ublox::{ParserBuilder, UbxPacket};
+
+    let (mut expected, mut wire) = (Vec::new(), Wire(Vec::new()));
+    let model = NavDynamicModel::AirborneWithLess4gAcceleration;
+    let layers = CfgLayerSet::RAM;
+    let cfg_data = &[CfgVal::NavSpgDynModel(model)];
+    CfgValSetBuilder { version: 0, layers, reserved1: 0, cfg_data }.extend_to(&mut expected);
+    let (layers, cfg_keys) = (CfgLayerGet::Ram, &[CfgKey::NavSpgDynModel]);
+    CfgValGetRequestBuilder { version: 0, layers, position: 0, cfg_keys }.extend_to(&mut expected);
+    gnss::request_airborne(&mut wire);
+    // The crate writes other lengths than the payload has, and the checksum of the right one.
+    (expected[4], expected[17 + 4]) = (9, 8);
+    let last = expected.len() - 2;
+    expected.truncate(last);
+    expected.extend(gnss::checksum(&wire.0[17 + 2..17 + 14]));
+    assert_eq!(wire.0, expected);
+
+    let frame = nav_pvt([353_470_000, -1_178_090_000], 612_345, [1_500, -250, -30_000], true);
+    let [ours] = parsed(&frame)[..] else { panic!("one fix") };
+    let mut parser = ParserBuilder::new().with_vec_buffer();
+    let mut packets = parser.consume_ubx(&frame);
+    let Some(Ok(UbxPacket::Proto33(PacketRef::NavPvt(theirs)))) = packets.next() else { panic!("no fix") };
+    assert_eq!(
+        [ours.latitude_deg, ours.longitude_deg, ours.height_m],
+        [theirs.latitude(), theirs.longitude(), theirs.height_msl()]
+    );
+    assert_eq!(ours.velocity_ned_m_s, [theirs.vel_north(), theirs.vel_east(), theirs.vel_down()]);
+    let FixQuality { satellites, horizontal_m, vertical_m, speed_m_s } = ours.quality;
+    assert_eq!(satellites, u32::from(theirs.num_satellites()));
+    assert_eq!(
+        [horizontal_m, vertical_m, speed_m_s],
+        [theirs.horizontal_accuracy(), theirs.vertical_accuracy(), theirs.speed_accuracy()]
+    );
 }
 
 fn luna(range_cm: u16, strength: u16) -> [u8; 9] {
@@ -209,21 +251,15 @@ fn recipe() -> Recipe {
     Recipe::built_in("mk3", "field").unwrap().starting_at(StartPoint::Pad).unwrap()
 }
 
-fn mission() -> Mission {
+pub(crate) fn mission() -> Mission {
     let mut mission = recipe().mission;
     mission.airframe.servos_report = false;
     mission.site = Site { altitude_m: PAD_M, temperature_c: Some(AIR_K - 273.15), ..mission.site };
     mission
 }
 
-/// It assumes that its rail is as in the drawing.
-fn at_power_up(mission: &Mission) -> Computer {
-    let cg_station_m = mission.airframe.mass.loaded_cg_station_m;
-    Computer::at_power_up(mission, &mission.launched().unwrap().standing(cg_station_m))
-}
-
 /// A world, and its data for the devices on the board's wires.
-struct Bench {
+pub(crate) struct Bench {
     world: World,
     sensors: Sensors,
     pad: Degrees,
@@ -233,15 +269,19 @@ struct Bench {
     imu: Option<[i16; 6]>,
     imu_name: u8,
     igniters: [bool; 2],
-    prom: [u16; 8],
-    barometer: (u8, u64),
+    barometer_name: u8,
+    /// Frame of its last sample.
+    barometer: u64,
+    /// Whether the receiver is set to airborne, and can be.
+    airborne: bool,
+    obeys: bool,
     uarts: [VecDeque<u8>; 2],
     actuators: Actuators,
     outputs: [bool; 5],
     pin_out: bool,
     requests: Vec<Request>,
     submitted: Option<(u64, Box<Planner>)>,
-    log: Vec<u8>,
+    pub(crate) log: Vec<(u64, Vec<u8>)>,
     slots: [Vec<u8>; 2],
 }
 
@@ -263,8 +303,6 @@ impl Bench {
         let mut params = recipe.dispersion.sensor_params;
         params.barometer.period_ms = FRAME_MS;
         (params.lidar.range_min_m, params.lidar.range_max_m) = (0.2, 8.0);
-        let mut prom = PROM;
-        prom[7] = u16::from(barometer::crc4(&PROM));
         let bench = Self {
             world,
             sensors: Sensors::new(&params, &mission.sensors, drawn.flight_seed, 1.0).unwrap(),
@@ -274,8 +312,10 @@ impl Bench {
             imu: None,
             imu_name: 0x47,
             igniters: [true; 2],
-            prom,
-            barometer: (0, 0),
+            barometer_name: 0x60,
+            barometer: 0,
+            airborne: false,
+            obeys: true,
             uarts: [VecDeque::new(), VecDeque::new()],
             actuators: Actuators::NONE,
             outputs: [false; 5],
@@ -327,24 +367,26 @@ impl Bench {
         counts
     }
 
-    /// Present value of the barometer's converter.
-    fn barometer_raw(&self) -> u32 {
-        let (command, since) = self.barometer;
-        // 9.04 ms: two frames.
-        if self.frame < since + 2 {
-            return 0;
+    /// Status, pressure and temperature of the barometer: a new one every 20 ms.
+    fn barometer_data(&mut self) -> [u8; 7] {
+        if self.frame < self.barometer + 4 {
+            return [0; 7];
         }
-        if command == 0x58 {
-            return TEMPERATURE_RAW;
-        }
+        self.barometer = self.frame;
         let standard_k = Air::at_geopotential_m(PAD_M).temperature_k;
         let above_m = self.measured.unwrap().pressure_altitude_m.unwrap() * standard_k / AIR_K;
         let pressure_pa = Air::at_geopotential_m(PAD_M + above_m).pressure_pa;
-        // The pressure is a straight line over the counts.
-        let at = |raw| barometer::compensated(&PROM, raw, TEMPERATURE_RAW).1;
-        let (low, high) = (8_000_000, 9_000_000);
-        let slope = (at(high) - at(low)) / f64::from(high - low);
-        (f64::from(low) + (pressure_pa - at(low)) / slope).round() as u32
+        // The pressure falls with the counts: bisected.
+        let coefficients = barometer::Coefficients::of(&COEFFICIENTS);
+        let at = |raw| coefficients.compensated(raw, TEMPERATURE_RAW).1;
+        let (mut low, mut high) = (0, 1 << 24);
+        while high - low > 1 {
+            let middle = u32::midpoint(low, high);
+            if (at(middle) > pressure_pa) == (at(low) > pressure_pa) { low = middle } else { high = middle }
+        }
+        let [a, b, c, _] = low.to_le_bytes();
+        let [d, e, f, _] = TEMPERATURE_RAW.to_le_bytes();
+        [0x70, a, b, c, d, e, f]
     }
 }
 
@@ -385,15 +427,16 @@ impl i2c::I2c for Device {
     fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Infallible> {
         assert_eq!(address, 0x77);
         let mut bench = self.bench.borrow_mut();
-        let i2c::Operation::Write(&[command]) = operations[0] else { panic!("a command first") };
-        if let (0x48 | 0x58, frame) = (command, bench.frame) {
-            bench.barometer = (command, frame);
-        }
-        if let Some(i2c::Operation::Read(into)) = operations.get_mut(1) {
-            match command {
-                0 => into.copy_from_slice(&bench.barometer_raw().to_be_bytes()[1..]),
-                word => into.copy_from_slice(&bench.prom[usize::from(word - 0xA0) / 2].to_be_bytes()),
-            }
+        let Some((i2c::Operation::Write(written), rest)) = operations.split_first_mut() else {
+            panic!("a register first")
+        };
+        match (*written, rest) {
+            ([0x00], [i2c::Operation::Read(into)]) => into[0] = bench.barometer_name,
+            ([0x03], [i2c::Operation::Read(into)]) => into.copy_from_slice(&bench.barometer_data()),
+            ([0x31], [i2c::Operation::Read(into)]) => into.copy_from_slice(&COEFFICIENTS),
+            // Reset, oversampling, rate, filter, and the mode that starts it.
+            ([0x7E, 0xB6] | [0x1C, 0x03] | [0x1D, 0x02] | [0x1F, 0] | [0x1B, 0x33], []) => {}
+            other => panic!("{other:?}"),
         }
         Ok(())
     }
@@ -410,6 +453,30 @@ impl Read for Device {
         assert!(count > 0, "it would wait");
         waiting.copy_to_slice(&mut into[..count]);
         Ok(count)
+    }
+}
+
+/// The receiver sets its model, and answers which it is.
+impl Write for Device {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Infallible> {
+        let mut bench = self.bench.borrow_mut();
+        assert_eq!(gnss::checksum(&bytes[2..bytes.len() - 2]), bytes[bytes.len() - 2..]);
+        match bytes[3] {
+            0x8A => bench.airborne |= bench.obeys && bytes[10..15] == [0x21, 0x00, 0x11, 0x20, 8],
+            0x8B => {
+                let model = if bench.airborne { 8 } else { 0 };
+                let mut answer =
+                    vec![0xB5, 0x62, 0x06, 0x8B, 9, 0, 1, 0, 0, 0, 0x21, 0x00, 0x11, 0x20, model];
+                answer.extend(gnss::checksum(&answer[2..]));
+                bench.uarts[0].extend(answer);
+            }
+            other => panic!("{other:#x}"),
+        }
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> Result<(), Infallible> {
+        Ok(())
     }
 }
 
@@ -494,16 +561,16 @@ impl Chip for Device {
 
     fn send(&mut self, _: &[CrewMessage]) {}
 
-    fn append(&mut self, record: &[u8]) {
-        self.bench.borrow_mut().log.extend_from_slice(record);
+    fn append(&mut self, frame: u64, record: &[u8]) {
+        self.bench.borrow_mut().log.push((frame, record.to_vec()));
     }
 
     fn log(&self) -> LogState {
         LogState { running: true, space_bytes: 1 << 34 }
     }
 
-    fn battery_v(&mut self) -> Option<f64> {
-        None
+    fn batteries_v(&mut self) -> [Option<f64>; 2] {
+        [None; 2]
     }
 
     fn clock_s(&mut self) -> f64 {
@@ -566,7 +633,7 @@ const CREW_COMES: u64 = 1_000;
 
 /// Flies from power-up until the vehicle is at rest. The board loses its power for 0.1 s half a
 /// second after the beginning of a phase.
-fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
+pub(crate) fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
     let (bench, computer) = Bench::standing(&mission());
     let (bench, begun) = (Rc::new(RefCell::new(bench)), start_to_log(&computer));
     let (mut frames, mut board) = switched_on(&bench, computer);
@@ -601,10 +668,9 @@ fn fly(resets_in: Option<Phase>) -> (Bench, ComputerStart) {
 /// The log is that of the flight computer: another one with its inputs and the crew's requests
 /// decides and remembers the same. Returns the plans.
 fn verified(bench: &Bench, begun: &ComputerStart) -> usize {
-    let (mut log, mut again, mut plans) =
-        (bench.log.as_slice(), RecordedComputer::started(&mission(), begun), 0);
-    while !log.is_empty() {
-        let frame = ComputerFrame::decode_length_delimited(&mut log).unwrap();
+    let (mut again, mut plans) = (RecordedComputer::started(&mission(), begun), 0);
+    for (_, record) in &bench.log {
+        let frame = ComputerFrame::decode(&record[..]).unwrap();
         let read = again.read(&frame.input).unwrap();
         let output = again.step(&read);
         assert_eq!(again.record(&read, &output), frame);
@@ -663,18 +729,19 @@ fn an_open_igniter_is_reported() {
 #[test]
 fn a_part_that_does_not_start_is_silent() {
     let (mut bench, computer) = Bench::standing(&mission());
-    (bench.imu_name, bench.prom[3]) = (0xFF, 0);
+    (bench.imu_name, bench.barometer_name, bench.obeys) = (0xFF, 0x50, false);
     bench.pin_out = true;
     let bench = Rc::new(RefCell::new(bench));
     let (mut frames, mut board) = switched_on(&bench, computer);
     assert_eq!(board.imu, Err(Trouble::AnotherImu(0xFF)));
-    let said = board.barometer.as_ref().unwrap_err().to_string();
-    assert_eq!(said, "the checksum of the barometer's coefficients is wrong");
+    let reported = board.barometer.as_ref().unwrap_err().to_string();
+    assert_eq!(reported, "the barometer calls itself 0x50; 0x60, a BMP390, is accepted");
     for _ in 0..1_000 {
         bench.borrow_mut().advance();
         assert!(tick(&mut frames, &mut board));
         let measured = frames.computer().input().measured;
         assert!(!measured.imu.is_plausible() && measured.pressure_altitude_m.is_none());
+        assert!(measured.gnss.is_none(), "a receiver that is not set to airborne");
     }
     let checks = frames.computer().arming_checks();
     for (name, found) in [("gyro", "gyro silent for 5.0 s"), ("barometer", "barometer silent for 5.0 s")] {
