@@ -402,7 +402,7 @@ fn a_second_station_under_the_same_id_neither_commands_nor_sustains_a_countdown(
     one.signal(Signal::SIGKILL);
     other.wait_until("the hold", |window| {
         never_here(window);
-        window.shows("HOLD: the vehicle did not hear its station for 1 s").then_some(())
+        window.shows("HOLD: no uplink from its station for 1 s").then_some(())
     });
     other.type_bytes(b"\x18\r");
     other.wait_until("the abort", |window| {

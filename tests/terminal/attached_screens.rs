@@ -48,7 +48,7 @@ fn an_abort_requested_from_a_hung_station_is_reported_at_once_and_sent_when_it_r
     screen.wait_for("every arming check passes");
     daemon.signal(Signal::SIGSTOP);
     screen.type_bytes(b"\x18\r");
-    screen.wait_for(" ABORT NOT SENT: the station hangs; it sends it when it goes on");
+    screen.wait_for(" ABORT NOT SENT: the station hangs; it sends it when it resumes");
     assert_eq!(aborts_sent(&pad), 0);
     // A new screen shows no state, but the reason, and the requested abort.
     let mut late = pad.attach(&[], &[]);

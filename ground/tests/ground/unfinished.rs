@@ -139,7 +139,7 @@ fn a_new_station_reports_the_unconfirmed_abort() {
         |rig: &Rig| rig.model.alarms.list().iter().any(|alarm| alarm.what.kind == AlarmKind::AbortBefore);
     assert!(!is_open(&rig));
     assert_eq!(stored(&rig), Some(Unfinished::default()));
-    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort: abort, danger: None })));
+    rig.msg(Msg::Unfinished(Box::new(Unfinished { abort, danger: None })));
     rig.run(0.1);
     assert!(is_open(&rig));
     rig.abort();
