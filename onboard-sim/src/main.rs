@@ -74,8 +74,8 @@ enum Command {
     /// decided.
     ///
     /// It prints which arming checks would refuse and why, when lift-off, burnout, separation,
-    /// apogee and parachute come, and which measurements are rejected. Nothing is connected, no crew
-    /// arms it, no phase is forced.
+    /// apogee and parachute come, and which measurements are rejected. Nothing is connected, no
+    /// crew arms it, no phase is forced.
     ///
     /// Exit code 0 if it saw an apogee, 3 if a separation or a parachute came at more than 30 m/s
     /// upwards, 5 without an apogee.

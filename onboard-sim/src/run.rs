@@ -102,7 +102,8 @@ pub fn run(recipe: &Recipe, store: &Store, progress: &(dyn Fn(&Counts) + Sync)) 
     Ok(total.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Flies some flights of a recipe, those of a campaign with it, and returns their rows. `done` gets the number of flights flown.
+/// Flies some flights of a recipe, those of a campaign with it, and returns their rows.
+/// `done` gets the number of flights flown.
 ///
 /// # Errors
 /// The first flight that cannot be set up or panics.

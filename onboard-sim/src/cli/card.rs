@@ -31,12 +31,12 @@ pub(crate) struct CardArguments {
     /// and the line downwind. By default downwind is up.
     #[arg(long, value_name = "DEG", value_parser = degrees)]
     wind_from: Option<f64>,
-    /// Flights in each wind of every failure mode; one that has not come half as far as the farthest
-    /// ends after 25. Fewer than 100 give neither a rate nor a radius.
+    /// Flights in each wind of every failure mode; one that has not come half as far as the
+    /// farthest ends after 25. Fewer than 100 give neither a rate nor a radius.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     flights: u64,
-    /// Flights in each wind of the failure modes that come down farthest. Below 368 the interval has no
-    /// upper end.
+    /// Flights in each wind of the failure modes that come down farthest. Below 368 the interval
+    /// has no upper end.
     #[arg(long, default_value_t = 368, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
     hazard_flights: u64,
     /// Folder of the card; one that exists is kept, and the card gets the next free name.

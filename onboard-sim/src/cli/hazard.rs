@@ -34,12 +34,12 @@ pub(crate) struct HazardArguments {
         value_name = "M/S,..."
     )]
     winds: Vec<f64>,
-    /// Flights in each wind of every failure mode, by which those are found that come down farthest.
-    /// One that has not come half as far as the farthest ends after 25.
+    /// Flights in each wind of every failure mode, by which those are found that come down
+    /// farthest. One that has not come half as far as the farthest ends after 25.
     #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     flights: u64,
-    /// Flights in each wind of the failure modes that come down farthest. 368 are needed for an upper end of
-    /// the interval.
+    /// Flights in each wind of the failure modes that come down farthest. 368 are needed for an
+    /// upper end of the interval.
     #[arg(long, default_value_t = 368, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     hazard_flights: u64,
     /// Write where each flight came down (CSV).

@@ -167,8 +167,8 @@ fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, check
 // dead-man confirmation is overdue.
 
 /// Silence of the commanding station after which an armed vehicle on its pad disarms itself, s: a
-/// crew that restarts its station needs some ten seconds, and no person should stand beside an armed
-/// vehicle without a commander.
+/// crew that restarts its station needs some ten seconds, and no person should stand beside an
+/// armed vehicle without a commander.
 const ALONE_S: f64 = 60.0;
 
 /// Time after a disarm in which only the station that disarmed may arm, s: two operators may have
