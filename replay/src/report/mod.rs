@@ -43,6 +43,8 @@ pub fn report(path: &Path) -> Result<Report, RecordingError> {
     let mut info = described(path)?;
     // The date says it.
     info.run.remove("start_unix_ns");
+    // The map shows it.
+    info.run.remove(sim::wire::field::RUN_FACT);
     let flight = Flight::of(recording, &mut info);
     let html = html::page(&flight, &info, &section::all(&flight, &info));
     Ok(Report { name: info.file, html, completeness: info.completeness })

@@ -1,6 +1,9 @@
 //! Where the vehicle was: its main moments, and the place from above.
 
 use flight::rules::phase::Phase;
+use protocol::field::{Field, Kind};
+use protocol::motion::Degrees;
+use sim::wire::field::{RUN_FACT, pad_of};
 
 use crate::report::chart::{Chart, Line, line};
 use crate::report::html::table;
@@ -38,7 +41,7 @@ pub(super) fn maps(flight: &Flight) -> String {
     // East is against y.
     let wind = wind.map(|estimate| (-estimate.wind_m_s.y, estimate.wind_m_s.x));
     let arrow = wind.map(|(east, north)| (east, north, format!("wind {:.1} m/s", libm::hypot(east, north))));
-    let picture = |title: &str, more: Option<Line>| Chart {
+    let picture = |title: &str, more: Vec<Line>| Chart {
         title: title.to_owned(),
         axes: "1 0",
         x_name: "east, m",
@@ -48,8 +51,48 @@ pub(super) fn maps(flight: &Flight) -> String {
         arrow: arrow.clone(),
         ..Chart::default()
     };
-    let Some(fence) = fence else { return picture(COMPLETE, None).svg() };
-    picture(COMPLETE, Some(fence)).svg() + &picture("The same closer, m", None).svg()
+    let Some(fence) = fence else { return picture(COMPLETE, Vec::new()).svg() };
+    let field = field_lines(flight, 2.0 * fence_m.unwrap_or_default());
+    let outside = std::iter::once(fence).chain(field).collect();
+    picture(COMPLETE, outside).svg()
+        + &picture("The same closer, m", Vec::new()).svg()
+        + &field_distances(flight)
+}
+
+/// The field around the pad that the log has.
+fn field_of(flight: &Flight) -> Option<(Field, Degrees)> {
+    let pad = pad_of(flight.pilot.as_ref()?.mission());
+    Some((Field::parse(flight.recording.head.run.get(RUN_FACT)?, pad, RUN_FACT).ok()?, pad))
+}
+
+/// Its lines east and north of the pad, m, as far as they are in a square about it: the picture is
+/// not to shrink.
+fn field_lines(flight: &Flight, half_m: f64) -> Vec<Line> {
+    /// Between two points, as a share of a segment.
+    const STEPS: u32 = 200;
+    let inside = |at: &(f64, f64)| at.0.abs().max(at.1.abs()) <= half_m;
+    let lines = field_of(flight).into_iter().flat_map(|(field, pad)| field.lines_m(pad).collect::<Vec<_>>());
+    let drawn = lines.map(|(kind, points): (Kind, Vec<(f64, f64)>)| {
+        let segments = points.windows(2).flat_map(|pair| {
+            let [from, to] = [pair[0], pair[1]];
+            (0..=STEPS).map(move |step| {
+                let share = f64::from(step) / f64::from(STEPS);
+                (from.1 + (to.1 - from.1) * share, from.0 + (to.0 - from.0) * share)
+            })
+        });
+        let nowhere = (f64::NAN, f64::NAN);
+        let points = segments.map(|at| if inside(&at) { at } else { nowhere }).collect();
+        line(kind.name(), if kind == Kind::CrowdLine { "fence" } else { "thin" }, points)
+    });
+    drawn.filter(|line| line.points.iter().any(|at| at.0.is_finite())).collect()
+}
+
+/// How far from the lines of the field it came down.
+fn field_distances(flight: &Flight) -> String {
+    let at = flight.contact().zip(field_of(flight));
+    at.map_or_else(String::new, |([north, east, ..], (field, pad))| {
+        format!("<p>Touchdown to the nearest {}</p>\n", field.distances(pad, (north, east)))
+    })
 }
 
 /// The pad, where the first plan ends, and where it came down.
