@@ -264,12 +264,17 @@ impl Card {
     /// Sources of the numbers of the front.
     fn sources(&self, winds: &[InWind]) -> String {
         let winds: Vec<String> = winds.iter().map(|wind| wind.wind_m_s.to_string()).collect();
+        let name = &self.recipe.dispersion_name;
+        let (set, winds) = match name.split_once(" with the winds of ") {
+            Some((set, file)) => (set, format!("--winds {file}")),
+            None => (name.as_str(), format!("--wind {}", winds.join(","))),
+        };
         let values = [
             ("rule", format!("{} ({})", self.rule, Rule::SOURCE)),
             ("fewest", FEWEST.to_string()),
             ("fence_m", format!("{:.0}", self.recipe.mission.gate.fence_radius_m)),
-            ("set", self.recipe.dispersion_name.clone()),
-            ("winds", winds.join(",")),
+            ("set", set.to_owned()),
+            ("winds", winds),
             ("seed", self.recipe.seed.to_string()),
             ("survey", self.flights.survey.to_string()),
             ("widest", self.flights.of_widest.to_string()),

@@ -46,7 +46,7 @@ impl WindsFile {
         let levels = flight::vehicles::winds::read(&read(path)?).with_context(|| format!("{origin}"))?;
         WindsAloft::try_from(levels.clone()).with_context(|| format!("{origin}"))?;
         let levels = levels.into_iter().map(|level| toml_edit::Value::from(Array::from_iter(level)));
-        with_set_value(&recipe, "winds_aloft", Array::from_iter(levels), &format!("the winds of {origin}"))
+        with_set_value(&recipe, "winds_aloft", levels.collect(), &format!("the winds of {origin}"))
     }
 }
 

@@ -126,6 +126,7 @@ pub(crate) fn drawn_from(
     let faults = run.get("faults").map_or("", String::as_str).split_whitespace();
     let faults: Result<Vec<TimedFault>, FaultError> = faults.map(str::parse).collect();
     let recipe = Recipe {
+        field: run.get(sim::wire::field::RUN_FACT).cloned(),
         mission: Schedule::of(toml, start, &[])?.base,
         mission_toml: toml.to_owned(),
         dispersion,

@@ -188,11 +188,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         plane.write(frame, (beside(x / 2.0), y / 2.0), &words, strong);
     }
     words(model, (fence_m, per_dot), theme, frame, &plane);
-    let measured = stands.or(lost.map(|at| (at.east_m, at.north_m))).or(impact);
-    if let Some(at) = measured.or(down.map(|at| (at.east_m, at.north_m))) {
-        let [complete, crowd] = field::distances(model, at);
-        plane.beside(frame, at, &[complete, crowd], theme.style(TextRole::Label));
-    }
+    write_distances(model, (stands.or(impact), lost.or(down)), theme, frame, &plane);
     let label = |frame: &mut Frame, at, words: &str| {
         plane.beside(frame, at, &[words.to_owned()], theme.style(TextRole::Label));
     };
@@ -204,6 +200,18 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     if let Some((at, tilt_deg)) = rail {
         label(frame, at, &format!("rail {} deg", fixed(tilt_deg, 0)));
     }
+}
+
+/// Writes how far the field's lines are beside a position, or else beside a spot.
+fn write_distances(
+    model: &Model,
+    (at, spot): (Option<(f64, f64)>, Option<Spot>),
+    theme: Theme,
+    frame: &mut Frame,
+    plane: &Plane,
+) {
+    let Some(at) = at.or(spot.map(|spot| (spot.east_m, spot.north_m))) else { return };
+    plane.beside(frame, at, &field::distances(model, at), theme.style(TextRole::Label));
 }
 
 /// What stands at the edges: north, the wind, the fence, the scale.
