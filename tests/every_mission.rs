@@ -14,7 +14,7 @@ use self::missions::TEST_MISSIONS;
 /// seed, in which all stand.
 fn shown(folder: &Path, mission: &str, text: &str) {
     let (log, file) = (format!("{mission}.mcap"), format!("{mission}.toml"));
-    std::fs::write(folder.join(&file), text).unwrap();
+    std::fs::write(folder.join(&file), text).expect("the file of the mission");
     let mut fly = program(Program::OnboardSim);
     fly.args(["fly", "--mission", &file, "--seed", "2", "--auto", "--speed", "max"]);
     fly.args(["--mavlink", "udpout:127.0.0.1:9"]);

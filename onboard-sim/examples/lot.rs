@@ -97,5 +97,5 @@ fn seen_by(pilot: &Mission, world: &Mission, drawn: &Draw) -> Draw {
         burn_time_scale: burn_time_scale * burn_time,
         ..drawn.truth
     };
-    Draw { truth, ..*drawn }
+    Draw { truth, ..drawn.clone() }
 }

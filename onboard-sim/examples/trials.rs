@@ -41,7 +41,7 @@ fn main() -> anyhow::Result<()> {
 /// The file, with its comments.
 fn written(text: &str, trials: &[Trial]) -> anyhow::Result<Vec<u8>> {
     let head = text.lines().take_while(|line| line.starts_with('#'));
-    let mut written = head.map(|line| format!("{line}\n")).collect::<String>().into_bytes();
+    let mut written = head.flat_map(|line| [line, "\n"]).collect::<String>().into_bytes();
     let mut rows = csv::Writer::from_writer(&mut written);
     trials.iter().try_for_each(|trial| rows.serialize(trial))?;
     drop(rows);

@@ -222,8 +222,8 @@ async fn start(
     let KeyRing { key, owner, book_key, roles } = KeyRing::open(link)?;
     next_log.book_key = book_key;
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
-    let checklist = args.flags.checklist.as_deref();
-    let checklist = checklist.map(|path| open_checklist(path, start_unix_s)).transpose()?;
+    let checklist =
+        args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
     // A demonstration flies this mission, so it cannot fly another.
     let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
     let mission = named.map(load_flight).transpose()?;
@@ -236,13 +236,10 @@ async fn start(
             .await;
     let mut wire = stations::explained(opened, &link.connect).await?;
     wire.forward_to(&args.flags.forward)?;
-    let demo = match (&demo_options, vehicle_clock) {
-        (Some(options), Some(vehicle_clock)) => {
-            let demo = Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock);
-            Some(demo.context("starting the simulator")?)
-        }
-        _ => None,
-    };
+    let demo = demo_options.as_ref().zip(vehicle_clock).map(|(options, vehicle_clock)| {
+        Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)
+    });
+    let demo = demo.transpose().context("starting the simulator")?;
     let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {

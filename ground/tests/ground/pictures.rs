@@ -491,10 +491,10 @@ fn is_ready(moment: &Moment) -> bool {
 
 /// The pictures of the pages from the recorded flight: on the pad, in the descent, in the burn, and
 /// after the landing.
-fn moments() -> [(&'static str, Palette, Moment); 4] {
+fn moments() -> Vec<(&'static str, Palette, Moment)> {
     let falls = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_AERO_DESCENT && moment.height_m < 220.0;
     let burns = |moment: &Moment| moment.phase == TdPhase::TD_PHASE_POWERED && moment.height_m < 15.0;
-    [
+    vec![
         ("pad-light", Palette::Light, recorded(is_ready)),
         ("descent-dark", Palette::Dark, recorded(falls)),
         ("burn-dark", Palette::Dark, recorded(burns)),

@@ -30,7 +30,7 @@ fn parts_moved_into_each_other_are_found() {
     ] {
         assert!(MK3.contains(from), "{from}");
         let drawing = mk3(&MK3.replace(from, to));
-        let moved = from.split(",").next().unwrap();
+        let moved = from.split(',').next().unwrap();
         let found = drawing.overlaps();
         let touches = |[one, other]: &[&str; 2]| {
             one.starts_with(pair) && *other == moved || *one == moved && other.starts_with(pair)

@@ -19,14 +19,16 @@ fn row(heading: &str, first: &str) -> Vec<u64> {
     cells.filter_map(number).collect()
 }
 
+/// A column of the trials.
+type Column = fn(&Trial) -> u64;
+
 #[test]
 fn the_tables_of_the_page_are_the_measured_ones() {
     let trials = trials();
-    let of = |table: &str, which: fn(&Trial) -> u64| -> Vec<u64> {
+    let of = |table: &str, which: Column| -> Vec<u64> {
         trials.iter().filter(|trial| trial.table == table).map(which).collect()
     };
-    let (stands, envelope): (fn(&Trial) -> u64, fn(&Trial) -> u64) =
-        (|trial| trial.stands, |trial| trial.envelope);
+    let (stands, envelope): (Column, Column) = (|trial| trial.stands, |trial| trial.envelope);
     assert_eq!(row("\n### Mass\n", "stand"), of("mass", stands));
     assert_eq!(row("\n### Mass\n", "inside"), of("mass", envelope));
     for (table, heading) in [("reset", "| reset |"), ("brown-out", "| brown-out |")] {

@@ -1,6 +1,7 @@
 //! Winds over height: flown, recorded, and on every page that depends on the wind.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
@@ -44,7 +45,7 @@ fn the_world_has_the_wind_of_the_table() {
     let [north_m_s, west_m_s] = [0, 1].map(|axis: usize| flight.world().wind().mean_m_s(110.0)[axis]);
     assert!((north_m_s + 4.0).abs() < 1e-9 && (west_m_s + 2.0).abs() < 1e-9, "{north_m_s} {west_m_s}");
     let truth = flight.world().truth();
-    assert!((truth.wind_m_s - 4.0).abs() < 1e-12 && (truth.wind_towards_rad + 1.570_796).abs() < 1e-6);
+    assert!((truth.wind_m_s - 4.0).abs() < 1e-12 && (truth.wind_towards_rad + FRAC_PI_2).abs() < 1e-6);
 }
 
 #[test]

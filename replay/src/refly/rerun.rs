@@ -132,7 +132,6 @@ pub(crate) fn drawn_from(
         dispersion,
         dispersion_name: run.get("dispersion").cloned().unwrap_or_default(),
         dispersion_toml: head.scenario_toml.clone().unwrap_or_default(),
-        field: None,
         seed,
         faults: faults.map_err(|error| lacking(error.to_string()))?,
     };
