@@ -77,7 +77,7 @@ const ELSEWHERE: [(&str, &str, &str); 28] = [
 ];
 
 /// What the pages say that a line answers: how the line begins, and words of its answer.
-const COMMANDS: [(&str, &str); 20] = [
+const COMMANDS: [(&str, &str); 21] = [
     ("onboard-sim fly --start pad --fault abort@descent", "ABORTED, then DOWN UNDER THE PARACHUTE"),
     ("onboard-sim fly --start pad --fault separation-fails@0", "DOWN UNDER THE PARACHUTE"),
     ("onboard-sim campaign --only 17", "touchdown_vertical_m_s"),
@@ -92,7 +92,8 @@ const COMMANDS: [(&str, &str); 20] = [
     ("replay recover cut.mcap", "whole.mcap"),
     ("replay refly flight.mcap --without-fault gnss-out", "flown again"),
     ("replay compare flight.mcap without.mcap", "without.mcap"),
-    ("replay export flight.mcap", "tables"),
+    ("replay export flight.mcap --out flight.kml", "touchdown planned at ignition"),
+    ("replay export flight.mcap --out tables", "tables"),
     ("replay fit flight.mcap ", "drag"),
     ("replay fit fits.json --mission mk3 --flights", "GO"),
     ("replay compare logs again", "shows no difference"),

@@ -438,7 +438,7 @@ mod tests {
             (["--connect", "tcp:host:1"], "udpin:ADDRESS:PORT"),
             (["--forward", "tcpout:host:1"], "udpout:HOST:PORT"),
             (["--timeout-s", "-1"], "from 0.1 to 86400"),
-            (["--sysid", "0"], "1..=255"),
+            (["--sysid", "0"], "from 1 to 255"),
             (["--speed", "0"], "0.01"),
         ] {
             let refused = refuse(&wrong);

@@ -186,7 +186,7 @@ mod tests {
             ("belll = true", "belll", "bell"),
             ("connect = [\"tcp\"]", "connect", "udpin:ADDRESS:PORT"),
             ("theme = \"blue\"", "theme", "light"),
-            ("sysid = 0", "sysid", "1..=255"),
+            ("sysid = 0", "sysid", "from 1 to 255"),
             ("vehicle_sysid = 256", "vehicle_sysid", "1..=255"),
             ("key = []", "key", "a text"),
             ("log = true", "log", "a text"),

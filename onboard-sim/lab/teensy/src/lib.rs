@@ -4,7 +4,7 @@
 //! Everything here is written for the traits of `embedded-hal` and `embedded-io`, so that it runs
 //! on a desk, too: `tests.rs` puts simulated devices in the place of the real ones. The image
 //! (`chip.rs`) adds a [`Wiring`], a [`Chip`], an entry, a heap, and a timer that calls [`tick`]
-//! every 5 ms. `README.md` has pins and parts.
+//! every 5 ms. [`card`] writes the log to an SD card. `README.md` has pins and parts.
 #![cfg_attr(target_os = "none", no_std)]
 
 extern crate alloc;
