@@ -75,7 +75,7 @@
   };
   // The address names the time, so that it can be sent to somebody: `report.html#t=14.70`.
   const remember = () => { try { history.replaceState(null, "", `#t=${now.toFixed(2)}`); } catch { /* a page in a frame has no address */ } };
-  const named = () => { const [, time] = /^#t=(-?[\d.]+)$/.exec(location.hash) || []; return time === undefined ? NaN : Number(time); };
+  const named = () => { const found = /^#t=(-?\d+\.?\d*)$/.exec(location.hash); return found && Number(found[1]); };
   const stop = () => { cancelAnimationFrame(playing); playing = 0; button.textContent = "play"; };
   const play = () => {
     if (playing) { stop(); remember(); return; }
@@ -88,7 +88,7 @@
   button.addEventListener("click", play);
   range.addEventListener("input", () => { stop(); to(Number(range.value)); });
   range.addEventListener("change", remember);
-  addEventListener("hashchange", () => { if (isFinite(named())) { stop(); to(named()); } });
+  addEventListener("hashchange", () => { if (named() !== null) { stop(); to(named()); } });
 
   // A part of the time in all pictures over time.
   let seen = null;
@@ -269,6 +269,6 @@
   if (rows.length > 1) {
     document.querySelector("main").append(bar);
     const sign = document.querySelector("circle.sign");
-    to(isFinite(named()) ? named() : data.at ?? (sign ? Number(sign.dataset.t) : (first + last) / 2));
+    to(named() ?? data.at ?? (sign ? Number(sign.dataset.t) : (first + last) / 2));
   }
 })();

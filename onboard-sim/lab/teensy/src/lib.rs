@@ -208,7 +208,7 @@ pub struct TeensyBoard<W: Wiring> {
 pub fn mission(name: &str) -> Option<(&'static str, Mission)> {
     let (_, toml) = BUILTIN.iter().find(|(available, _)| *available == name)?;
     let mut mission = builtin(name)?.ok()?;
-    mission.airframe.servos_tell = false;
+    mission.airframe.servos_report = false;
     Some((toml, mission))
 }
 
