@@ -11,7 +11,8 @@ use crate::motion::Degrees;
 
 /// The most points of a field; a drawn one has some hundred.
 const POINTS_MAX: usize = 20_000;
-/// A field farther from its pad than this is that of another pad, or has its coordinates swapped, m.
+/// A field farther from its pad than this is that of another pad, or has its coordinates swapped,
+/// m.
 const FARTHEST_M: f64 = 50_000.0;
 
 /// Kind of a line.

@@ -82,8 +82,8 @@ pub const SETTINGS_IN_FLIGHT: &str = "settings_in_flight";
 pub struct LoggedComputer {
     computer: RecordedComputer,
     schedule: Schedule,
-    /// If false, input and digest of a frame are copied from the record: the digest takes a third of
-    /// the time, and a computer that did not wait on the pad remembers less.
+    /// If false, input and digest of a frame are copied from the record: the digest takes a third
+    /// of the time, and a computer that did not wait on the pad remembers less.
     pub(crate) compares_digests: bool,
 }
 

@@ -21,7 +21,8 @@
 //! * [`table`]: reads a log as tables; [`compare`](mod@compare): compares flights signal by signal.
 //! * [`report`](mod@report): writes a flight as one HTML page.
 //! * [`import`](mod@import): flights of other programs as logs.
-//! * [`export`]: writes a log as CSV, and the flown path for maps; [`recover`](mod@recover): repairs a damaged log.
+//! * [`export`]: writes a log as CSV, and the flown path for maps; [`recover`](mod@recover):
+//!   repairs a damaged log.
 //! * [`output`](onboard_sim::files): writes files completely or not at all, each new one under a
 //!   name that is free.
 //! * [`print`](mod@print): what answers have in common: columns, two verdicts beside each other.

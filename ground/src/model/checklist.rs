@@ -23,8 +23,8 @@ pub struct Checklist {
     pub name: String,
     /// The name of the only mission that it applies to, as the vehicle reports it; `None` for any.
     pub mission: Option<String>,
-    /// The first eight bytes of the SHA-256 of its text, as hexadecimal digits. Signatures count for
-    /// this text only.
+    /// The first eight bytes of the SHA-256 of its text, as hexadecimal digits. Signatures count
+    /// for this text only.
     pub hash: String,
     pub steps: Vec<Step>,
 }

@@ -109,8 +109,8 @@ fn val_hand_the_servo_of_a_fin() {
     assert!(section.contains(&format!("the {opens_s:.2} s that their servos take")), "{opens_s}");
 }
 
-/// The cut lengths of a leg's tubes and wire reach from the skin at the hinge and at the tail to the
-/// joint above the foot.
+/// The cut lengths of a leg's tubes and wire reach from the skin at the hinge and at the tail to
+/// the joint above the foot.
 #[test]
 fn val_hand_the_lengths_of_a_leg() {
     let airframe = mission::builtin_airframe("mk3").unwrap();

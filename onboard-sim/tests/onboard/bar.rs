@@ -32,7 +32,8 @@ fn regress_flights_with_field_dispersions_land_on_their_legs() {
 }
 
 /// The vehicle expects the certified curve, and its motor has one half way to that of old stock:
-/// 245 of 300 flights stand. The old one itself, with 10 % less impulse, lands 36 of 300 (seed 2002).
+/// 245 of 300 flights stand. The old one itself, with 10 % less impulse, lands 36 of 300 (seed
+/// 2002).
 #[test]
 fn regress_a_motor_half_way_to_the_other_of_its_name_is_landed_on() {
     let mut recipe = Recipe::built_in("mk3", "real").unwrap();

@@ -124,7 +124,8 @@ impl<R: Read> TlogReader<R> {
                     self.mavlink1 += 1;
                 }
                 _ => {
-                    // To the next byte that may begin a frame: a file may end in gigabytes of zeros.
+                    // To the next byte that may begin a frame: a file may end in gigabytes of
+                    // zeros.
                     let ahead = self.buffer[TIME_BYTES + 1..].iter();
                     let skipped = ahead.take_while(|byte| ![MAGIC_1, MAGIC_2].contains(byte)).count() + 1;
                     self.buffer.drain(..skipped);

@@ -169,7 +169,8 @@ fn a_recovered_log_is_not_complete() {
     refusal(replay("recover", &files.file(b"nothing")).arg(other));
 }
 
-/// A degree of latitude is 110,941.6 m and of longitude 90,899.4 m at 35.347 degrees north (WGS 84).
+/// A degree of latitude is 110,941.6 m and of longitude 90,899.4 m at 35.347 degrees north (WGS
+/// 84).
 #[test]
 fn val_wgs84_the_flown_path_is_exported_for_maps() {
     let log = &crate::simulated::WITH_FRAMES.log;

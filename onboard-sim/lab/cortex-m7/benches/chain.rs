@@ -5,7 +5,8 @@
 //! not part of `cargo test`: it requires QEMU, the programs of `emulate build` and some minutes of
 //! real time. Without them it prints NOT RUN and the reason.
 //!
-//! `cargo bench -p board --bench chain` in `onboard-sim/lab`, or `onboard-sim/lab/cortex-m7/emulate test`.
+//! `cargo bench -p board --bench chain` in `onboard-sim/lab`, or `onboard-sim/lab/cortex-m7/emulate
+//! test`.
 
 use std::io::Write as _;
 use std::path::Path;

@@ -19,8 +19,9 @@ const COMMIT_MARGIN: f64 = 1.5;
 
 /// Share of the burn's reach towards the pad on which the prediction counts. Of 33 `harsh` flights
 /// (seed 7001) a second before their ignition, 30 touched down nearer than predicted or within 2 m,
-/// and the others by up to 14 m farther. Half a second before it, the landing position of mk2 is off
-/// by 3.4 m in the median of `field`, and 3.8 m in `real`; with the whole reach by 5.1 and 8.4 m.
+/// and the others by up to 14 m farther. Half a second before it, the landing position of mk2 is
+/// off by 3.4 m in the median of `field`, and 3.8 m in `real`; with the whole reach by 5.1 and 8.4
+/// m.
 const REACH_SHARE: f64 = 0.5;
 
 /// Lowest assumed fall speed, m/s, so that the time to the ground is finite at apogee.

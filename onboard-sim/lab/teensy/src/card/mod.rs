@@ -241,8 +241,8 @@ impl<D: BlockDevice, T: TimeSource> CardLog<D, T> {
     }
 }
 
-/// File with which each log begins: made on a desk by this package's program, and copied to the card
-/// by a person. Without it nothing is recorded, and so nothing armed.
+/// File with which each log begins: made on a desk by this package's program, and copied to the
+/// card by a person. Without it nothing is recorded, and so nothing armed.
 pub const HEAD: &str = "HEAD.MCA";
 
 /// Name of the metadata about lost records.

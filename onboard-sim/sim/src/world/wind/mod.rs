@@ -73,8 +73,8 @@ impl Wind {
         Self { aloft, ..self }
     }
 
-    /// This wind with the mean at the reference height and the gust intensity of another wind; the gusts themselves
-    /// continue.
+    /// This wind with the mean at the reference height and the gust intensity of another wind; the
+    /// gusts themselves continue.
     pub(crate) fn changed(&self, other: &Self) -> Self {
         let gusts = self.gusts.as_strong_as(&other.gusts);
         let aloft = self.aloft.as_ref().map(|(aloft, _)| aloft);

@@ -2,8 +2,9 @@
 //!
 //! The landing motor has some per cent of the body's inertia. When it swings, the body turns the
 //! other way ([`swinging_kg_m2`](crate::vehicle::airframe::Airframe::swinging_kg_m2)), and the gyro
-//! measures that independently of the servo feedback. So the gimbal swings to and fro from fin deployment to ignition, pitch and yaw
-//! alternately, and the gyro is compared with the expected rate.
+//! measures that independently of the servo feedback. So the gimbal swings to and fro from fin
+//! deployment to ignition, pitch and yaw alternately, and the gyro is compared with the expected
+//! rate.
 //!
 //! Aerodynamic and fin moments turn the body more, but more slowly. The signs of the swing's rate
 //! are a Thue-Morse sequence, and the sum of any parabola over it with these signs is zero (E.
