@@ -167,7 +167,7 @@ fn fly(mission: &Mission, wind_m_s: f64, flights: u64) -> Flown {
     assert_eq!(theirs.len(), draws.len());
     let in_our_world = |drawn: &Draw| Sortie::drawn_as(mission, &dispersion, drawn).unwrap().run();
     let ours = draws.iter().map(in_our_world).collect();
-    let anew = |drawn: &Draw| in_our_world(&Draw { flight_seed: drawn.flight_seed ^ 1, ..*drawn });
+    let anew = |drawn: &Draw| in_our_world(&Draw { flight_seed: drawn.flight_seed ^ 1, ..drawn.clone() });
     Flown { theirs, ours, again: draws.iter().map(anew).collect() }
 }
 
