@@ -57,7 +57,9 @@ fn script_data(page: &str) -> serde_json::Value {
 /// The flight computer is run again to get its plans.
 #[test]
 fn the_report_states_the_verdict_first_and_then_why() {
-    let mk3 = fly_recipe(&Flown::built_in("mk3", "none").unwrap());
+    // Without sensor noise a third of mk3's flights have the false finding of a slow gimbal, whose
+    // picture is drawn first; of 25 `real` flights none.
+    let mk3 = fly_recipe(&Flown::built_in("mk3", "real").unwrap());
     for log in [&LANDED.log, &MK2.log, &DISPERSED.log, &WITH_FRAMES.log, &mk3.log] {
         let page = page_of(log);
         let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|<a href=\"geo:35.34|Findings, causes first|\
