@@ -1,5 +1,6 @@
 //! The drivers against their data sheets, and the complete board flown: simulated devices with the
 //! registers, frames and pulses of the real ones connect it to a simulated world.
+#![expect(clippy::float_cmp, reason = "two decoders of the same bytes give the same bits")]
 
 use std::cell::RefCell;
 use std::collections::VecDeque;

@@ -18,9 +18,12 @@ use crate::tests::fly;
 const PARTITION: usize = 8;
 const SECTORS: usize = 80_000;
 
+/// A record and its time, ns.
+type Timed = (u64, Vec<u8>);
+
 /// Frames and records of a flight, and the head of its log.
-fn flown() -> &'static (Vec<(u64, Vec<u8>)>, Vec<u8>) {
-    static FLOWN: OnceLock<(Vec<(u64, Vec<u8>)>, Vec<u8>)> = OnceLock::new();
+fn flown() -> &'static (Vec<Timed>, Vec<u8>) {
+    static FLOWN: OnceLock<(Vec<Timed>, Vec<u8>)> = OnceLock::new();
     FLOWN.get_or_init(|| {
         let (bench, begun) = fly(None);
         let (toml, _) = crate::mission("mk3").unwrap();
