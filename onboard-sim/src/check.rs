@@ -17,7 +17,7 @@ use flight::vehicle::fins::{PITCH, YAW};
 use flight::vehicle::mission::{Mission, SensorPlaces};
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
-use sim::dispersion::may_be_kinder;
+use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
 
 use crate::frame::{Frame, FrameError, changed};
@@ -275,7 +275,7 @@ fn proposal(recipe: &Recipe, motors: &[Candidate], than: Verdict) -> Result<Stri
 fn flown(recipe: &Recipe, rows: &[Flown]) -> Row {
     let stands = Landings::of(rows.iter().map(Flown::landing)).stands;
     let found = format!("{} of {} flights stand", stands.count, stands.of);
-    let kinder = if may_be_kinder(&recipe.dispersion_name) { "; real may be harder" } else { "" };
+    let kinder = if is_more_benign(&recipe.dispersion_name) { "; real may be harder" } else { "" };
     let beside = format!("{}{kinder}", recipe.dispersion_name);
     Row::new("flights", FLIGHTS.judge(stands.share), found, beside).or(|| {
         let most = failures(rows).into_iter().next();

@@ -25,8 +25,7 @@ pub fn lines_m(recipe: &Recipe) -> Vec<(&'static str, Vec<(f64, f64)>)> {
     lines.map(|(kind, points)| (class(kind), points)).collect()
 }
 
-/// The crowd line beside the radius within which nobody may stand by rule and fence; `None` without
-/// a field.
+/// The crowd line beside the exclusion radius of rule and fence; `None` without a field.
 pub fn crowd(recipe: &Recipe) -> Option<Row> {
     const WHAT: &str = "crowd";
     recipe.field.as_ref()?;

@@ -2,7 +2,7 @@
 //! stream in the same run.
 //!
 //! `cargo bench -p protocol --bench throughput`. Rounds alternate between the two, so that a
-//! machine that slows down slows both; the shortest rounds are compared. "and keep" is our decoder
+//! machine that slows down slows both; the shortest rounds are compared. "and store" is our decoder
 //! with a copy of every frame's bytes, which rust-mavlink does not make.
 
 use std::hint::black_box;
@@ -89,7 +89,7 @@ fn decode_ours(stream: &[u8]) -> usize {
 }
 
 /// Keeps every frame, as vehicle and ground do for their logs.
-fn decode_and_keep_ours(stream: &[u8]) -> usize {
+fn decode_and_store_ours(stream: &[u8]) -> usize {
     let mut framer = Framer::new();
     let mut count = 0;
     for piece in stream.chunks(PIECE) {
@@ -181,6 +181,6 @@ fn main() -> std::io::Result<()> {
     let stream = stream_of(&messages);
     writeln!(std::io::stdout(), "{COUNT} messages, {} bytes, shortest of {ROUNDS} rounds", stream.len())?;
     compare("decode", &mut || decode_ours(&stream), &mut || decode_theirs(&stream))?;
-    compare("and keep", &mut || decode_and_keep_ours(&stream), &mut || decode_theirs(&stream))?;
+    compare("and store", &mut || decode_and_store_ours(&stream), &mut || decode_theirs(&stream))?;
     compare("encode", &mut || encode_ours(&messages), &mut || encode_theirs(&messages))
 }

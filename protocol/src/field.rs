@@ -59,6 +59,13 @@ pub struct Line {
     pub points: Vec<Degrees>,
 }
 
+impl Line {
+    /// Its points north and east of a pad, m.
+    fn points_m(&self, pad: Degrees) -> Vec<(f64, f64)> {
+        self.points.iter().map(|at| pad.to(*at)).collect()
+    }
+}
+
 /// The lines of a field.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Field {
@@ -135,13 +142,14 @@ impl Field {
 
     /// The lines of each kind as points north and east of a pad, m.
     pub fn lines_m(&self, pad: Degrees) -> impl Iterator<Item = (Kind, Vec<(f64, f64)>)> {
-        self.lines.iter().map(move |line| (line.kind, line.points.iter().map(|at| pad.to(*at)).collect()))
+        self.lines.iter().map(move |line| (line.kind, line.points_m(pad)))
     }
 
     /// Distance of the nearest line of a kind from a position north and east of a pad, m.
     pub fn nearest_m(&self, kind: Kind, pad: Degrees, from_m: (f64, f64)) -> Option<f64> {
-        let lines = self.lines_m(pad).filter(|(of, _)| *of == kind);
-        lines.map(|(_, points)| distance_m(&points, from_m)).min_by(f64::total_cmp)
+        // Only these lines are converted: a screen computes the distances for every picture.
+        let lines = self.lines.iter().filter(|line| line.kind == kind);
+        lines.map(|line| distance_m(&line.points_m(pad), from_m)).min_by(f64::total_cmp)
     }
 
     /// The kinds present with the distance of their nearest line, m, in words.

@@ -4,7 +4,7 @@ use core::fmt;
 
 use sha2::{Digest as _, Sha256};
 
-use crate::command::whole_in;
+use crate::command::integer_in;
 use crate::text::shown;
 
 /// The first eight bytes of the SHA-256 of a mission's text, as in TD_MISSION. Any edit changes it,
@@ -67,7 +67,7 @@ impl Expected {
         for (place, param) in (0..).zip(params) {
             // The last parameter has the 20 bits that are left.
             let most = (u64::MAX >> (BITS_A_PARAM * place)) & MASK;
-            let Some(part) = whole_in(param, 1..=most as u32 + 1) else { return Self::Unreadable };
+            let Some(part) = integer_in(param, 1..=most as u32 + 1) else { return Self::Unreadable };
             bits |= u64::from(part - 1) << (BITS_A_PARAM * place);
         }
         Self::Hash(MissionHash(bits.to_le_bytes()))

@@ -140,7 +140,7 @@ pub const DEFAULT: &str = "real";
 
 /// Whether a number from this set may be kinder than one from [`DEFAULT`]: every set but this one,
 /// twice its errors, and it with more. Other winds do not matter.
-pub fn may_be_kinder(name: &str) -> bool {
+pub fn is_more_benign(name: &str) -> bool {
     let set = name.split_once(" with ").map_or(name, |(set, _)| set);
     !["real", "real-harsh", "wild"].contains(&set)
 }

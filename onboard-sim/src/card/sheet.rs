@@ -6,7 +6,7 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::StartPoint;
 use flight::vehicle::thrust_curve::ThrustCurve;
-use sim::dispersion::may_be_kinder;
+use sim::dispersion::is_more_benign;
 use sim::wire::field::{field_of, pad_of};
 
 use super::range_safety::{
@@ -107,7 +107,7 @@ impl Card {
             subtitle: format!(
                 "From {}. Simulated, not flown: set {set}{}, seed {}.",
                 self.begins(),
-                if may_be_kinder(set) { " (which may be kinder than real)" } else { "" },
+                if is_more_benign(set) { " (which may be kinder than real)" } else { "" },
                 self.recipe.seed
             ),
             sections: vec![

@@ -7,9 +7,9 @@ use clap::Args;
 use onboard_sim::card::Card;
 use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::hazard::Flights;
-use protocol::program::Exit;
+use protocol::program::{Exit, in_range};
 
-use super::{Selection, in_winds, on_threads, show_flights};
+use super::{MeanWinds, Selection, on_threads, show_flights};
 
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
@@ -18,26 +18,19 @@ const CARD_FLIGHTS_MAX: u64 = 10_000;
 pub(crate) struct CardArguments {
     #[command(flatten)]
     selection: Selection,
-    /// Mean winds 10 m above the ground, m/s, each with a radius and a rate of its own.
-    #[arg(
-        long = "wind",
-        conflicts_with = "winds_file",
-        value_delimiter = ',',
-        default_value = "0,3,6,8.9",
-        value_name = "M/S,..."
-    )]
-    winds: Vec<f64>,
+    #[command(flatten)]
+    mean_winds: MeanWinds,
     /// Where the wind of the day comes from, degrees clockwise from north: the plan has north up
     /// and the line downwind. By default downwind is up.
     #[arg(long, value_name = "DEG", value_parser = degrees)]
     wind_from: Option<f64>,
     /// Flights in each wind of every failure mode; one that has not come half as far as the
     /// farthest ends after 25. Fewer than 100 give neither a rate nor a radius.
-    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = in_range(1..=CARD_FLIGHTS_MAX))]
     flights: u64,
     /// Flights in each wind of the failure modes that come down farthest. Below 368 the interval
     /// has no upper end.
-    #[arg(long, default_value_t = 368, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=CARD_FLIGHTS_MAX))]
+    #[arg(long, default_value_t = 368, value_name = "N", value_parser = in_range(1..=CARD_FLIGHTS_MAX))]
     hazard_flights: u64,
     /// Folder of the card; one that exists is kept, and the card gets the next free name.
     #[arg(long, default_value = "card", value_name = "DIR")]
@@ -46,7 +39,7 @@ pub(crate) struct CardArguments {
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let recipe = arguments.selection.recipe(None)?;
-    let winds = in_winds(&recipe, &arguments.winds)?;
+    let winds = arguments.mean_winds.applied(&recipe)?;
     let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
     let flights = Flights { survey, of_widest };
     let card = on_threads(arguments.selection.jobs, || {

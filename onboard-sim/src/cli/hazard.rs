@@ -11,11 +11,11 @@ use onboard_sim::hazard::{
     self, Case, Flights, Impact, Radius, Rule, exclusion_m, landed_as_planned, widest,
 };
 use onboard_sim::statistics::Landings;
-use protocol::program::Exit;
-use sim::dispersion::may_be_kinder;
+use protocol::program::{Exit, in_range};
+use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
 
-use super::{Selection, in_winds, on_threads, show_flights};
+use super::{MeanWinds, Selection, on_threads, show_flights};
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
@@ -25,22 +25,15 @@ pub(crate) struct HazardArguments {
     /// else the mission's].
     #[arg(long, value_name = "START")]
     start: Option<StartPoint>,
-    /// Mean winds 10 m above the ground, m/s.
-    #[arg(
-        long = "wind",
-        conflicts_with = "winds_file",
-        value_delimiter = ',',
-        default_value = "0,3,6,8.9",
-        value_name = "M/S,..."
-    )]
-    winds: Vec<f64>,
+    #[command(flatten)]
+    mean_winds: MeanWinds,
     /// Flights in each wind of every failure mode, by which those are found that come down
     /// farthest. One that has not come half as far as the farthest ends after 25.
-    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = in_range(1..=100_000_u64))]
     flights: u64,
     /// Flights in each wind of the failure modes that come down farthest. 368 are needed for an
     /// upper end of the interval.
-    #[arg(long, default_value_t = 368, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    #[arg(long, default_value_t = 368, value_name = "N", value_parser = in_range(1..=100_000_u64))]
     hazard_flights: u64,
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
@@ -71,7 +64,7 @@ fn recipes(arguments: &HazardArguments) -> anyhow::Result<Vec<(f64, Recipe)>> {
     if arguments.start.is_none() && recipe.mission.launch.is_some() {
         recipe = recipe.starting_at(StartPoint::Pad)?;
     }
-    in_winds(&recipe, &arguments.winds)
+    arguments.mean_winds.applied(&recipe)
 }
 
 /// The flights with their arguments.
@@ -103,7 +96,7 @@ impl Study<'_> {
             out,
             "Set `{dispersion}`{}, seed {seed}; mean wind 10 m above the ground. A cell: the radius that holds 99 % of the flights,\n\
              (its 95 % interval by order statistics; ?: too few flights for an upper end), the farthest; number of flights.\n",
-            if may_be_kinder(dispersion) { ", which may be kinder than `real`" } else { "" }
+            if is_more_benign(dispersion) { ", which may be kinder than `real`" } else { "" }
         )?;
         let of_each = |cell: &dyn Fn(&Vec<Impact>) -> String| {
             self.impacts.iter().map(|impacts| format!("{:<29}", cell(impacts))).collect::<Vec<_>>().concat()

@@ -50,6 +50,33 @@ impl WindsFile {
     }
 }
 
+/// Mean winds to compare.
+#[derive(Args)]
+pub(crate) struct MeanWinds {
+    /// Mean winds 10 m above the ground, m/s, each with results of its own.
+    #[arg(
+        long = "wind",
+        conflicts_with = "winds_file",
+        value_delimiter = ',',
+        default_value = "0,3,6,8.9",
+        value_name = "M/S,..."
+    )]
+    winds_m_s: Vec<f64>,
+}
+
+impl MeanWinds {
+    /// The same flights in each wind, rising; in their winds aloft if they have any.
+    fn applied(&self, recipe: &Recipe) -> anyhow::Result<Vec<(f64, Recipe)>> {
+        if let Some(winds) = &recipe.dispersion.winds_aloft {
+            return Ok(vec![((10.0 * winds.near_ground().0).round() / 10.0, recipe.clone())]);
+        }
+        let mut winds_m_s = self.winds_m_s.clone();
+        winds_m_s.sort_by(f64::total_cmp);
+        winds_m_s.dedup();
+        winds_m_s.into_iter().map(|wind_m_s| Ok((wind_m_s, in_wind(recipe, wind_m_s)?))).collect()
+    }
+}
+
 /// What flies, under what chance.
 #[derive(Args)]
 pub(crate) struct Selection {
@@ -125,18 +152,6 @@ fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
     const MOST_M_S: f64 = 30.0;
     anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");
     with_set_value(recipe, "wind_m_s", Array::from_iter([wind_m_s; 2]), &format!("{wind_m_s} m/s of wind"))
-}
-
-/// The same flights in each mean wind 10 m above the ground, m/s, rising; in their winds aloft if
-/// they have any.
-fn in_winds(recipe: &Recipe, winds_m_s: &[f64]) -> anyhow::Result<Vec<(f64, Recipe)>> {
-    if let Some(winds) = &recipe.dispersion.winds_aloft {
-        return Ok(vec![((10.0 * winds.near_ground().0).round() / 10.0, recipe.clone())]);
-    }
-    let mut winds_m_s = winds_m_s.to_vec();
-    winds_m_s.sort_by(f64::total_cmp);
-    winds_m_s.dedup();
-    winds_m_s.into_iter().map(|wind_m_s| Ok((wind_m_s, in_wind(recipe, wind_m_s)?))).collect()
 }
 
 /// The same flights with another value of their set, described by `words`.

@@ -96,7 +96,7 @@ impl CommandRequest {
         if param7.is_nan() || param7.abs() < 0.5 {
             return AddressedBoot::Any;
         }
-        whole_in(param7, 1..=LARGEST_BOOT_NUMBER).map_or(AddressedBoot::Unreadable, AddressedBoot::Boot)
+        integer_in(param7, 1..=LARGEST_BOOT_NUMBER).map_or(AddressedBoot::Unreadable, AddressedBoot::Boot)
     }
 
     /// Returns whether the request is this MAV_CMD.
@@ -137,11 +137,11 @@ pub const FIRST_NUMBER: u32 = 65_536;
 const NUMBERS_END: u32 = 1 << 24;
 
 fn number_in(param2: f32) -> Option<u32> {
-    whole_in(param2, FIRST_NUMBER..=NUMBERS_END - 1)
+    integer_in(param2, FIRST_NUMBER..=NUMBERS_END - 1)
 }
 
 /// The whole number of this range that a parameter contains. A float represents both ends exactly.
-pub fn whole_in(param: f32, range: RangeInclusive<u32>) -> Option<u32> {
+pub fn integer_in(param: f32, range: RangeInclusive<u32>) -> Option<u32> {
     let fits = (*range.start() as f32..=*range.end() as f32).contains(&param);
     (fits && libm::truncf(param).to_bits() == param.to_bits()).then_some(param as u32)
 }

@@ -21,7 +21,7 @@ use flight::vehicle::mission::Mission;
 use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
 use serde::Serialize;
-use sim::dispersion::{DEFAULT, Dispersion, may_be_kinder};
+use sim::dispersion::{DEFAULT, Dispersion, is_more_benign};
 use sim::draw::{Chance, Draw, draw};
 use sim::sortie::{SetUpError, Sortie};
 use sim::world::truth::Truth;
@@ -556,7 +556,7 @@ impl Answer for Learnt {
         lines.push(format!(
             "risk      {risk:.1} % that the rate is below {limit:.0} %; {taken:.0} % is taken"
         ));
-        lines.push(match (self.go == Some(true), may_be_kinder(set)) {
+        lines.push(match (self.go == Some(true), is_more_benign(set)) {
             (true, false) => "GO".to_owned(),
             (true, true) => format!("GO in {set} only, which may be kinder than {DEFAULT}"),
             (false, _) => "NO-GO".to_owned(),

@@ -6,6 +6,7 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 use flight::vehicles::mission::from_toml;
 use protocol::motion::Degrees;
+use sim::wire::field::pad_of;
 
 use super::track::{Flight, planned};
 use crate::info::{recorded, utc};
@@ -42,11 +43,10 @@ impl FlownPath {
         let first_ns = info.span.map_or(0, |span| span.first_ns);
         let zero_s = recording.clocks.flight_zero_s.unwrap_or(0.0);
         let flight = Flight::of(recording, &mut info);
-        let site = &mission.site;
-        let pad = Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg };
+        let pad = pad_of(&mission);
         let point = |time_s: f64, [north_m, east_m, up_m]: [f64; 3]| Point {
             at: pad.moved(north_m, east_m),
-            altitude_m: site.altitude_m + up_m,
+            altitude_m: mission.site.altitude_m + up_m,
             unix_ns: first_ns.saturating_add_signed(((zero_s + flight.axis_s(time_s)) * 1e9) as i64),
         };
         let mut track: Vec<Point> = Vec::new();

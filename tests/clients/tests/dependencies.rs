@@ -34,7 +34,7 @@ fn is_accepted(licence: &str) -> bool {
 }
 
 #[test]
-fn licences_are_weighed_as_their_expressions_say() {
+fn licences_are_evaluated_by_their_expressions() {
     for good in ["MIT", "MIT/Apache-2.0", "MIT OR GPL-3.0-only", "(MIT OR Apache-2.0) AND Unicode-3.0"] {
         assert!(is_accepted(good), "{good}");
     }

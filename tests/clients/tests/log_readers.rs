@@ -23,16 +23,16 @@ use replay::refly::{ReflyOptions, refly_flight, write_log};
 use from_apogee::LANDED;
 use simulated::{DISPERSED, MK2, WITH_FRAMES};
 
-fn said(command: &mut Command) -> String {
+fn output_of(command: &mut Command) -> String {
     let output = command.output().unwrap();
-    let said = String::from_utf8(output.stdout).unwrap();
-    assert!(output.status.success(), "{said}{}", String::from_utf8_lossy(&output.stderr));
-    said
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{printed}{}", String::from_utf8_lossy(&output.stderr));
+    printed
 }
 
 fn hex(number: f64) -> String {
     let print = format!("print(float('{number:?}').hex())");
-    said(READERS.python().arg("-c").arg(print)).trim().to_owned()
+    output_of(READERS.python().arg("-c").arg(print)).trim().to_owned()
 }
 
 /// Logs of the recorder, one flown again, one recovered, and one of a flight from apogee.
@@ -72,9 +72,9 @@ fn commands(log: &Path) -> (&'static str, usize, f64) {
 #[test]
 fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
     for log in LOGS.iter() {
-        let read = said(READERS.python().arg(file("readers/read_mcap.py")).arg(log));
+        let read = output_of(READERS.python().arg(file("readers/read_mcap.py")).arg(log));
         assert!(read.contains("/vehicle/truth3d"), "{read}");
-        said(READERS.program("pymcap-cli").arg("doctor").arg(log));
+        output_of(READERS.program("pymcap-cli").arg("doctor").arg(log));
         let recording = Recording::open(log).unwrap();
         let (topic, count, command_rad) = commands(log);
         assert!(read.contains(&format!("{topic} {count}\n")), "{read}");
@@ -89,7 +89,7 @@ fn logs_are_read_by_mcap_and_pass_pymcap_doctor() {
 #[test]
 fn logs_are_read_by_foxgloves_library() {
     for log in LOGS.iter() {
-        let read = said(NODE_MCAP.node().arg(file("readers/read_mcap.mjs")).arg(log));
+        let read = output_of(NODE_MCAP.node().arg(file("readers/read_mcap.mjs")).arg(log));
         let (topic, count, _) = commands(log);
         let mut channels = read.lines().map(|line| line.split(' ').collect::<Vec<_>>());
         let of_commands = channels.clone().find(|channel| channel[0] == topic).unwrap();
@@ -122,7 +122,7 @@ fn logs_open_in_foxglove_with_plots() {
         let mut open = FOXGLOVE.node();
         open.arg(file("readers/open_in_foxglove.mjs")).args([&browser, &flight.log]);
         open.args([height, gimbal]).arg(&picture);
-        let shown: serde_json::Value = serde_json::from_str(&said(&mut open)).unwrap();
+        let shown: serde_json::Value = serde_json::from_str(&output_of(&mut open)).unwrap();
         let words = shown["words"].as_str().unwrap();
         for channel in info(&flight.log).unwrap().channels {
             let listed = format!("{}\n{}\n{}\n", channel.topic, channel.schema, grouped(channel.messages));
@@ -143,7 +143,7 @@ fn grouped(count: u64) -> String {
 #[test]
 fn logs_pass_rerun_mcap_check() {
     for log in LOGS.iter() {
-        let checked = said(RERUN.program("rerun").args(["mcap", "check"]).arg(log));
+        let checked = output_of(RERUN.program("rerun").args(["mcap", "check"]).arg(log));
         let accepted = |line: &str| line.starts_with("ok ") && line.contains("/vehicle/truth3d");
         assert!(checked.lines().any(accepted), "{checked}");
         assert!(!checked.lines().any(|line| line.starts_with("error")), "{checked}");
@@ -158,7 +158,7 @@ fn a_table_is_read_by_pandas_polars_and_pyarrow() {
         let path = directory.join(table);
         let columns = files.iter().find(|file| file.path == path).unwrap().columns;
         for (column, value) in values {
-            let read = said(READERS.python().arg(file("readers/read_tables.py")).arg(&path).arg(column));
+            let read = output_of(READERS.python().arg(file("readers/read_tables.py")).arg(&path).arg(column));
             for reader in ["pandas", "polars", "pyarrow"] {
                 let line = format!("{reader} {rows} {columns} {}\n", hex(*value));
                 assert!(read.contains(&line), "{line} is not in\n{read}");
@@ -190,7 +190,7 @@ fn a_tlog_is_read_by_pymavlink() {
     }
     writer.flush().unwrap();
     let mut command = READERS.python();
-    let read = said(command.arg(file("readers/read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
+    let read = output_of(command.arg(file("readers/read_tlog.py")).arg(&path).env("MAVLINK20", "1"));
     for name in ["HEARTBEAT", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED"] {
         let line = read.lines().find(|line| line.starts_with(name)).unwrap();
         let count: u32 = line.rsplit(' ').next().unwrap().parse().unwrap();

@@ -68,7 +68,7 @@ fn run_client_that_listens(client: &mut Command) {
 }
 
 #[test]
-fn val_pymavlink_is_answered_as_the_standard_says() {
+fn val_pymavlink_receives_the_answers_of_the_standard() {
     run_client_that_sends_first(&mut pymavlink("pymavlink_client.py"));
 }
 

@@ -13,7 +13,7 @@ const INSTALLS_HERE: &str = "TOUCHDOWN_INSTALLS_HERE";
 static PYSERIAL: PythonPackages = PythonPackages::without_dependencies("pyserial", &["pyserial==3.5"]);
 static REACT: NodePackages = NodePackages::new("react", &["react@17.0.2"]);
 
-fn said(command: &mut Command) -> String {
+fn output_of(command: &mut Command) -> String {
     let output = command.output().unwrap();
     let words = [output.stdout, output.stderr].concat();
     let words = String::from_utf8_lossy(&words).trim().to_owned();
@@ -57,19 +57,19 @@ fn a_users_settings_of_python_and_node_have_no_effect() {
     ] {
         again.env(name, value);
     }
-    assert!(said(&mut again).contains("1 passed"));
+    assert!(output_of(&mut again).contains("1 passed"));
     assert!(!at("elsewhere").exists());
 }
 
 fn install_and_look(folder: &Path) {
     let python = PYSERIAL.install_below(folder).join("bin/python");
-    let serial = said(outside(python).args(["-c", "import serial; print(serial.__file__)"]));
+    let serial = output_of(outside(python).args(["-c", "import serial; print(serial.__file__)"]));
     assert!(Path::new(&serial).starts_with(folder), "{serial}");
     let react = REACT.install_below(folder);
     let mut node = outside(found(&["node", "nodejs"], "nodejs"));
-    let react = said(node.args(["-p", "require.resolve('react')"]).current_dir(react));
+    let react = output_of(node.args(["-p", "require.resolve('react')"]).current_dir(react));
     assert!(Path::new(&react).starts_with(folder), "{react}");
-    let seen = said(&mut outside("env"));
+    let seen = output_of(&mut outside("env"));
     let names: Vec<&str> =
         seen.lines().filter_map(|line| line.split_once('=')).map(|(name, _)| name).collect();
     let ours = ["PATH", "TMPDIR", "HOME", "LANG", "PYTHONUNBUFFERED", "PYTHONDONTWRITEBYTECODE"];

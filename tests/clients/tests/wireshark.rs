@@ -150,8 +150,8 @@ fn a_users_wireshark_settings_have_no_effect() {
         .env("WIRESHARK_DATA_DIR", home.path())
         .output()
         .unwrap();
-    let said = String::from_utf8_lossy(&again.stdout);
-    assert!(again.status.success() && said.contains("1 passed"), "{said}");
+    let printed = String::from_utf8_lossy(&again.stdout);
+    assert!(again.status.success() && printed.contains("1 passed"), "{printed}");
 }
 
 const OTHER_DISSECTOR: &str = "local other = Proto('mavlink_proto', 'Another project')\nerror('not ours')\n";

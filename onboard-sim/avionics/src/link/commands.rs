@@ -9,7 +9,7 @@ use alloc::borrow::ToOwned as _;
 use alloc::format;
 use alloc::string::String;
 use mavlink::MessageData as _;
-use protocol::command::{CommandRequest, whole_in};
+use protocol::command::{CommandRequest, integer_in};
 use protocol::dialect::{
     AUTOPILOT_VERSION_DATA, HOME_POSITION_DATA, MESSAGE_INTERVAL_DATA, MavCmd, MavResult,
 };
@@ -80,7 +80,7 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
         Ok(Command::Vehicle(CrewCommand::TakeCommand))
     } else if request.is(MavCmd::MAV_CMD_TD_PAD_CHECK) {
         let kinds = [CrewCommand::EndCheck, CrewCommand::Check, CrewCommand::CheckStill, CrewCommand::Seen];
-        if let Some(number) = whole_in(param1, 0..=3) {
+        if let Some(number) = integer_in(param1, 0..=3) {
             Ok(Command::Vehicle(kinds[number as usize]))
         } else {
             let accepted = "0 (end), 1 (all), 2 (without motion) or 3 (seen)";
@@ -107,7 +107,7 @@ pub fn parse(request: &CommandRequest) -> Result<Command, Unfit> {
 /// The number of the proposal that an arm or a start confirms, in parameter 3. Other ground
 /// stations leave it at 0 or NaN: their command is a proposal.
 pub fn confirmed_proposal(request: &CommandRequest) -> Option<u16> {
-    whole_in(request.params[2], 1..=u16::MAX.into()).and_then(|number| u16::try_from(number).ok())
+    integer_in(request.params[2], 1..=u16::MAX.into()).and_then(|number| u16::try_from(number).ok())
 }
 
 /// Parameter 2 of a forced arm or disarm, as other ground stations send it: PX4's (QGroundControl,
@@ -135,7 +135,7 @@ pub fn mav_result(ending: Ending) -> MavResult {
 /// A message id sent as a float.
 fn message_id(param: f32) -> Result<u32, Unfit> {
     let wrong = || denied(format!("message id {param}: must be a whole number from 0 to 16777215"));
-    whole_in(param, 0..=0x00FF_FFFF).map_or_else(wrong, Ok)
+    integer_in(param, 0..=0x00FF_FFFF).map_or_else(wrong, Ok)
 }
 
 fn denied<T>(reason: String) -> Result<T, Unfit> {

@@ -67,6 +67,12 @@ impl MissionName {
     }
 }
 
+/// The pad of a mission on the Earth.
+pub fn pad_of(mission: &Mission) -> Degrees {
+    let Site { latitude_deg: latitude, longitude_deg: longitude, .. } = mission.site;
+    Degrees { latitude, longitude }
+}
+
 /// The flight computer's pack, and the voltage of the other one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatteryFacts {
@@ -194,8 +200,7 @@ impl<'a> VehicleState<'a> {
 
     /// The pad on the Earth.
     pub fn pad(&self) -> Degrees {
-        let Site { latitude_deg: latitude, longitude_deg: longitude, .. } = self.mission().site;
-        Degrees { latitude, longitude }
+        pad_of(self.mission())
     }
 
     /// Level and last report of the controller.

@@ -17,7 +17,7 @@ use embedded_hal::i2c::{self, I2c};
 use embedded_hal::pwm::{self, SetDutyCycle};
 use embedded_hal::spi::{self, SpiDevice};
 use embedded_io::{Read, ReadReady};
-use embedded_sdmmc::{SdCard, TimeSource, Timestamp};
+use embedded_sdmmc::SdCard;
 use flight::computer::LogState;
 use flight::computer::messages::CrewMessage;
 use flight::computer::pilot::planner::Planner;
@@ -78,7 +78,7 @@ fn main() -> ! {
     static mut RING: Ring = Ring::new();
     HEAP.lock().init_from_slice(MEMORY);
     let (producer, mut consumer) = RING.split();
-    let mut log = CardLog::new(SdCard::new(StandIn, StandIn), StandIn);
+    let mut log = CardLog::new(SdCard::new(StandIn, StandIn));
     let Some((_, mission)) = teensy::mission("mk3") else {
         loop {
             cortex_m::asm::wfi();
@@ -264,19 +264,6 @@ impl InputPin for StandIn {
 
 impl DelayNs for StandIn {
     fn delay_ns(&mut self, _: u32) {}
-}
-
-impl TimeSource for StandIn {
-    fn get_timestamp(&self) -> Timestamp {
-        Timestamp {
-            year_since_1970: 0,
-            zero_indexed_month: 0,
-            zero_indexed_day: 0,
-            hours: 0,
-            minutes: 0,
-            seconds: 0,
-        }
-    }
 }
 
 /// The chip's services; a memory that outlasts a reset, a clock and a radio are stand-ins, too.

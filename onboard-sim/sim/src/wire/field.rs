@@ -2,19 +2,13 @@
 
 use std::path::Path;
 
-use flight::vehicle::mission::Mission;
+pub use avionics::link::vehicle::pad_of;
 use protocol::field::{Field, FieldError};
-use protocol::motion::Degrees;
 
 use crate::recipe::Recipe;
 
 /// The fact about a run with the text of its field.
 pub const RUN_FACT: &str = "field";
-
-/// Where the pad is.
-pub fn pad_of(mission: &Mission) -> Degrees {
-    Degrees { latitude: mission.site.latitude_deg, longitude: mission.site.longitude_deg }
-}
 
 /// This recipe with the field that its mission names, whose file is at this path.
 ///

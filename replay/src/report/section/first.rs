@@ -4,6 +4,7 @@
 use flight::rules::verdict::Landing;
 use protocol::log::v1::LimitResult;
 use protocol::motion::Degrees;
+use sim::wire::field::pad_of;
 
 use crate::findings::{Finding, over};
 use crate::info::Info;
@@ -69,8 +70,7 @@ fn verdict(flight: &Flight, info: &Info) -> String {
 
 /// The touchdown's position as a `geo:` URI (RFC 5870), which a telephone opens in its map.
 fn geo_link(flight: &Flight) -> Option<String> {
-    let ([north_m, east_m, ..], site) = (flight.contact()?, flight.pilot.as_ref()?.mission().site);
-    let pad = Degrees { latitude: site.latitude_deg, longitude: site.longitude_deg };
+    let ([north_m, east_m, ..], pad) = (flight.contact()?, pad_of(flight.pilot.as_ref()?.mission()));
     let Degrees { latitude, longitude } = pad.moved(north_m, east_m);
     Some(format!(" <a href=\"geo:{latitude:.6},{longitude:.6}\">{latitude:.6}, {longitude:.6}</a>"))
 }

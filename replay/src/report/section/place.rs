@@ -65,29 +65,37 @@ fn field_of(flight: &Flight) -> Option<(Field, Degrees)> {
     Some((Field::parse(flight.recording.head.run.get(RUN_FACT)?, pad, RUN_FACT).ok()?, pad))
 }
 
-/// Its lines east and north of the pad, m, as far as they are in a square about it: the picture is
-/// not to shrink.
+/// The lines of the field east and north of the pad, m, clipped to a square about it, so that the
+/// picture does not shrink.
 fn field_lines(flight: &Flight, half_m: f64) -> Vec<Line> {
-    /// Between two points, as a share of a segment.
-    const STEPS: u32 = 200;
-    let inside = |at: &(f64, f64)| at.0.abs().max(at.1.abs()) <= half_m;
+    const GAP: (f64, f64) = (f64::NAN, f64::NAN);
     let lines = field_of(flight).into_iter().flat_map(|(field, pad)| field.lines_m(pad).collect::<Vec<_>>());
     let drawn = lines.map(|(kind, points): (Kind, Vec<(f64, f64)>)| {
-        let segments = points.windows(2).flat_map(|pair| {
-            let [from, to] = [pair[0], pair[1]];
-            (0..=STEPS).map(move |step| {
-                let share = f64::from(step) / f64::from(STEPS);
-                (from.1 + (to.1 - from.1) * share, from.0 + (to.0 - from.0) * share)
-            })
-        });
-        let nowhere = (f64::NAN, f64::NAN);
-        let points = segments.map(|at| if inside(&at) { at } else { nowhere }).collect();
+        let segments = points.windows(2).filter_map(|pair| clipped([pair[0], pair[1]], half_m));
+        let points = segments.flat_map(|[from, to]| [(from.1, from.0), (to.1, to.0), GAP]).collect();
         line(kind.name(), if kind == Kind::CrowdLine { "fence" } else { "thin" }, points)
     });
     drawn.filter(|line| line.points.iter().any(|at| at.0.is_finite())).collect()
 }
 
-/// How far from the lines of the field it came down.
+/// The part of a segment inside a square about the origin (Y.-D. Liang and B. A. Barsky, "A new
+/// concept and method for line clipping", ACM Transactions on Graphics 3, 1984).
+fn clipped([from, to]: [(f64, f64); 2], half_m: f64) -> Option<[(f64, f64); 2]> {
+    let along = (to.0 - from.0, to.1 - from.1);
+    let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
+    for (start, along) in [(from.0, along.0), (from.1, along.1)] {
+        if along.abs() > 0.0 {
+            let [one, other] = [-half_m, half_m].map(|side| (side - start) / along);
+            (enters, leaves) = (enters.max(one.min(other)), leaves.min(one.max(other)));
+        } else if start.abs() > half_m {
+            return None;
+        }
+    }
+    let at = |share: f64| (from.0 + along.0 * share, from.1 + along.1 * share);
+    (enters <= leaves).then(|| [at(enters), at(leaves)])
+}
+
+/// Distances of the touchdown from the lines of the field.
 fn field_distances(flight: &Flight) -> String {
     let at = flight.contact().zip(field_of(flight));
     at.map_or_else(String::new, |([north, east, ..], (field, pad))| {
@@ -162,6 +170,16 @@ pub(super) fn moments(flight: &Flight) -> Vec<(&'static str, &Sample)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_hand_a_segment_is_clipped_at_the_sides_of_the_square() {
+        let clip = |from, to| clipped([from, to], 10.0);
+        assert_eq!(clip((-5.0, 0.0), (5.0, 8.0)), Some([(-5.0, 0.0), (5.0, 8.0)]));
+        assert_eq!(clip((-20.0, 4.0), (20.0, 4.0)), Some([(-10.0, 4.0), (10.0, 4.0)]));
+        assert_eq!(clip((0.0, 0.0), (40.0, 20.0)), Some([(0.0, 0.0), (10.0, 5.0)]));
+        assert_eq!(clip((11.0, -5.0), (11.0, 5.0)), None, "beside it");
+        assert_eq!(clip((0.0, 25.0), (25.0, 0.0)), None, "past its corner");
+    }
 
     /// A station has no place of a vehicle on its pad: from there to the rail nothing flew.
     #[test]

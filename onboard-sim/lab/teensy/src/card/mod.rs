@@ -12,7 +12,8 @@ use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
 use embedded_sdmmc::{
-    BlockDevice, Error, Mode, RawDirectory, RawFile, ShortFileName, TimeSource, VolumeIdx, VolumeManager,
+    BlockDevice, Error, Mode, RawDirectory, RawFile, ShortFileName, TimeSource, Timestamp, VolumeIdx,
+    VolumeManager,
 };
 use flight::computer::{FRAME_MS, LogState};
 use heapless::spsc::{Consumer, Producer, Queue};
@@ -74,10 +75,26 @@ impl<'a> Appender<'a> {
     }
 }
 
+/// The board has no calendar: files have no date.
+struct NoClock;
+
+impl TimeSource for NoClock {
+    fn get_timestamp(&self) -> Timestamp {
+        Timestamp {
+            year_since_1970: 0,
+            zero_indexed_month: 0,
+            zero_indexed_day: 0,
+            hours: 0,
+            minutes: 0,
+            seconds: 0,
+        }
+    }
+}
+
 /// The main context's end: writes the ring to a card.
-pub struct CardLog<D: BlockDevice, T: TimeSource> {
+pub struct CardLog<D: BlockDevice> {
     /// `None` only while it is made again.
-    card: Option<VolumeManager<D, T>>,
+    card: Option<VolumeManager<D, NoClock>>,
     file: Option<RawFile>,
     pending: Vec<u8>,
     /// Messages of the next chunk, with the times of the first and the last, ns: a reader trusts
@@ -90,11 +107,11 @@ pub struct CardLog<D: BlockDevice, T: TimeSource> {
     state: LogState,
 }
 
-impl<D: BlockDevice, T: TimeSource> CardLog<D, T> {
+impl<D: BlockDevice> CardLog<D> {
     /// A log on a card with the file [`HEAD`].
-    pub fn new(card: D, time: T) -> Self {
+    pub fn new(card: D) -> Self {
         Self {
-            card: Some(VolumeManager::new(card, time)),
+            card: Some(VolumeManager::new(card, NoClock)),
             file: None,
             pending: Vec::with_capacity(WRITE_BYTES + usize::from(u16::MAX)),
             chunk: Vec::with_capacity(WRITE_BYTES + usize::from(u16::MAX)),
@@ -263,9 +280,7 @@ pub(crate) fn put_text(into: &mut Vec<u8>, text: &str) {
 
 /// Begins the next file, `FLIGHT00.MCA` and on, in the root of the first partition; returns it and
 /// the space that the card has.
-fn begun<D: BlockDevice, T: TimeSource>(
-    card: &VolumeManager<D, T>,
-) -> Result<(RawFile, u64), Error<D::Error>> {
+fn begun<D: BlockDevice>(card: &VolumeManager<D, NoClock>) -> Result<(RawFile, u64), Error<D::Error>> {
     let volume = card.open_raw_volume(VolumeIdx(0))?;
     let folder: RawDirectory = card.open_root_dir(volume)?;
     let (mut next, mut used_bytes) = (0, 0);

@@ -5,7 +5,7 @@ use std::io::{Cursor, Read as _, Write as _};
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use embedded_sdmmc::{Block, BlockCount, BlockIdx, Timestamp};
+use embedded_sdmmc::{Block, BlockCount, BlockIdx};
 use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
 use prost::Message as _;
 use protocol::log::computer_v1::ComputerFrame;
@@ -99,21 +99,6 @@ impl BlockDevice for Slot {
     }
 }
 
-struct NoClock;
-
-impl TimeSource for NoClock {
-    fn get_timestamp(&self) -> Timestamp {
-        Timestamp {
-            year_since_1970: 0,
-            zero_indexed_month: 0,
-            zero_indexed_day: 0,
-            hours: 0,
-            minutes: 0,
-            seconds: 0,
-        }
-    }
-}
-
 /// A formatted card with the head, and a file that leaves so many bytes.
 fn formatted(free_bytes: Option<usize>) -> Vec<u8> {
     let mut bytes = vec![0; 512 * SECTORS];
@@ -170,16 +155,12 @@ fn read(content: &[u8]) -> (Vec<(u64, Vec<u8>)>, bool) {
 }
 
 /// Writes the flight; the writer polls once in each frame in which the card does not hold it up.
-fn written(
-    bytes: Vec<u8>,
-    stalls: Option<[usize; 2]>,
-    pulled_after: usize,
-) -> (Rc<Card>, CardLog<Slot, NoClock>) {
+fn written(bytes: Vec<u8>, stalls: Option<[usize; 2]>, pulled_after: usize) -> (Rc<Card>, CardLog<Slot>) {
     let (producer, mut consumer) = Box::leak(Box::new(Ring::new())).split();
     let feeder = RefCell::new(Feeder { next: 0, appender: Appender::new(producer) });
     let card =
         Rc::new(Card { bytes: RefCell::new(bytes), writes: Cell::new(0), stalls, pulled_after, feeder });
-    let mut log = CardLog::new(Slot(card.clone()), NoClock);
+    let mut log = CardLog::new(Slot(card.clone()));
     while card.feeder.borrow().next < flown().0.len() {
         card.feeder.borrow_mut().feed(1);
         log.poll(&mut consumer);
