@@ -111,15 +111,11 @@ impl Field {
     /// # Errors
     /// [`FieldError`] names the feature and what is accepted.
     pub fn parse(text: &str, pad: Degrees, origin: &str) -> Result<Self, FieldError> {
-        let origin = origin.to_owned();
         let is_kml = text.trim_start_matches('\u{feff}').trim_start().starts_with('<');
         let features = if is_kml { of_kml(text) } else { of_geojson(text) };
-        let features = match features {
-            Ok(features) => features,
-            Err(problem) => return Err(FieldError::Format { origin, problem }),
-        };
+        let format = |problem| FieldError::Format { origin: origin.to_owned(), problem };
         let mut lines = Vec::new();
-        for (place, (name, stated, paths)) in features.into_iter().enumerate() {
+        for (place, (name, stated, paths)) in features.map_err(format)?.into_iter().enumerate() {
             let read: Result<Vec<Line>, String> = match Kind::of(stated.as_deref().unwrap_or(&name)) {
                 Some(kind) => paths.iter().map(|path| line(kind, path, pad)).collect(),
                 None => Err(format!(
@@ -127,15 +123,13 @@ impl Field {
                     Kind::ALL.map(Kind::name).join(", ")
                 )),
             };
-            match read {
-                Ok(read) => lines.extend(read),
-                Err(problem) => return Err(FieldError::Feature { origin, number: place + 1, name, problem }),
-            }
+            let (origin, number) = (origin.to_owned(), place + 1);
+            lines.extend(read.map_err(|problem| FieldError::Feature { origin, number, name, problem })?);
         }
         let points = lines.iter().map(|line| line.points.len()).sum::<usize>();
         if !(1..=POINTS_MAX).contains(&points) {
             let problem = format!("has {points} points; accepted: 1 to {POINTS_MAX}");
-            return Err(FieldError::Lines { origin, problem });
+            return Err(FieldError::Lines { origin: origin.to_owned(), problem });
         }
         Ok(Self { lines })
     }

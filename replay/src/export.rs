@@ -50,14 +50,13 @@ pub fn export_tables<R: Read>(log: &mut FlightLog<R>, directory: &Path) -> Resul
             }
         };
         file.rows += 1;
-        let mut written = Ok(());
+        let failed = |error: csv::Error| WriteError::at(&file.path)(error.into());
         for cell in row.cells {
             text.clear();
             write_cell(&cell, &mut text)?;
-            written = written.and_then(|()| csv.write_field(&text));
+            csv.write_field(&text).map_err(failed)?;
         }
-        let written = written.and_then(|()| csv.write_record(None::<&[u8]>));
-        Ok(written.map_err(io::Error::from).map_err(WriteError::at(&file.path))?)
+        Ok(csv.write_record(None::<&[u8]>).map_err(failed)?)
     })?;
     let finished = open.into_values().map(|(file, csv)| {
         let written = csv.into_inner().map_err(csv::IntoInnerError::into_error);

@@ -40,8 +40,8 @@ pub(crate) struct CardArguments {
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let recipe = arguments.selection.recipe(None)?;
     let winds = arguments.mean_winds.applied(&recipe)?;
-    let (survey, of_widest) = (arguments.flights, arguments.hazard_flights.max(arguments.flights));
-    let flights = Flights { survey, of_widest };
+    let survey = arguments.flights;
+    let flights = Flights { survey, of_widest: arguments.hazard_flights.max(survey) };
     let card = on_threads(arguments.selection.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
@@ -55,6 +55,5 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
 
 /// A direction.
 fn degrees(text: &str) -> Result<f64, String> {
-    let degrees = text.parse().ok().filter(|degrees| (0.0..=360.0).contains(degrees));
-    degrees.ok_or_else(|| format!("`{text}` is not a direction of 0 to 360 degrees"))
+    in_range(0.0..=360.0)(text).map_err(|_range| format!("`{text}` is not a direction of 0 to 360 degrees"))
 }

@@ -1,6 +1,7 @@
 //! The flown path for maps and other programs, as KML 2.2 or GPX 1.1: the track, the touchdown that
 //! was planned at the ignition, and the fence. Altitudes are above mean sea level.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, ensure};
@@ -71,8 +72,7 @@ impl FlownPath {
         }
         let fence_m = mission.gate.fence_radius_m;
         let corner = |corner: u32| {
-            let turn_rad = std::f64::consts::TAU * f64::from(corner % CORNERS) / f64::from(CORNERS);
-            let (sin, cos) = libm::sincos(turn_rad);
+            let (sin, cos) = libm::sincos(TAU * f64::from(corner % CORNERS) / f64::from(CORNERS));
             // Counter-clockwise.
             point(began_s, [fence_m * sin, fence_m * cos, 0.0])
         };

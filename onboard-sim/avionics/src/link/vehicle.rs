@@ -198,11 +198,6 @@ impl<'a> VehicleState<'a> {
         self.computer.pilot().report().took_s
     }
 
-    /// The pad on the Earth.
-    pub fn pad(&self) -> Degrees {
-        pad_of(self.mission())
-    }
-
     /// Level and last report of the controller.
     pub fn controller(&self) -> Option<(ControlLevel, &'a PoweredReport)> {
         match self.airborne() {

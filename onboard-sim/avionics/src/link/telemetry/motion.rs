@@ -14,7 +14,7 @@ use protocol::dialect::{
 };
 
 use super::boot_ms;
-use crate::link::vehicle::{Airborne, VehicleState};
+use crate::link::vehicle::{Airborne, VehicleState, pad_of};
 
 /// Sine of pitch above which roll and heading are the same rotation: above 0.99999 (0.26 degrees
 /// from upright) single precision cannot separate them.
@@ -75,7 +75,7 @@ pub(super) fn attitude(state: &VehicleState<'_>) -> MavMessage {
 
 /// Latitude and longitude, 1e-7 degrees, of a point at this distance north and east of the pad, m.
 fn degrees_e7(state: &VehicleState<'_>, north_m: f64, east_m: f64) -> (i32, i32) {
-    let at = state.pad().moved(north_m, east_m);
+    let at = pad_of(state.mission()).moved(north_m, east_m);
     (libm::round(1e7 * at.latitude) as i32, libm::round(1e7 * at.longitude) as i32)
 }
 

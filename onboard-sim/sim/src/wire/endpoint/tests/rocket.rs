@@ -10,6 +10,7 @@ use protocol::dialect::{
 };
 
 use super::*;
+use crate::wire::field::pad_of;
 use crate::wire::fly::{Delayed, load_flight};
 
 struct Airborne {
@@ -316,7 +317,7 @@ fn its_map_position_is_at_the_pad_of_its_mission() {
     let MavMessage::GLOBAL_POSITION_INT(place) = airborne.request(GLOBAL_POSITION_INT_DATA::ID) else {
         panic!("not the position")
     };
-    let pad = airborne.rocket.state().pad();
+    let pad = pad_of(airborne.rocket.state().mission());
     // Within a few hundred metres of the pad, some 200 m up; a degree is 111 km.
     assert!((f64::from(place.lat) * 1e-7 - pad.latitude).abs() < 5e-3, "{place:?}");
     assert!((f64::from(place.lon) * 1e-7 - pad.longitude).abs() < 5e-3, "{place:?}");
