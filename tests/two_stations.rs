@@ -151,7 +151,7 @@ fn the_command_is_taken_over_when_the_commanding_laptop_dies() {
     launch.ann.type_until(b"CTAKE\r", "RANGE SAFETY Ann commands");
     assert!(shows(&launch.ann, " ARMED "), "the vehicle stays armed");
     // One alone still does not start it.
-    launch.ann.type_until(b"0SSTART\r", "RANGE SAFETY Ann asks to start");
+    launch.ann.type_until(b"0SSTART\r", "RANGE SAFETY Ann requests to start");
     assert!(!shows(&launch.ann, "countdown runs"));
     launch.ann.type_until(b"D\r", "disarmed PAD_IDLE");
 }

@@ -13,7 +13,7 @@ use tempfile::{NamedTempFile, TempPath};
 
 /// Neither a built-in text nor a file.
 #[derive(Debug, thiserror::Error)]
-#[error("'{name}' is neither a built-in {what} ({available}) nor a readable file{hint}")]
+#[error("'{name}' is neither a built-in {what} ({available}{hint}) nor a readable file")]
 pub struct UnknownText {
     name: String,
     what: &'static str,

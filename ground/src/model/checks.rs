@@ -151,7 +151,7 @@ mod tests {
                 Some((TdCheck::TD_CHECK_TILT, "tilt from vertical 6.00 deg")),
             ),
             ("pin out: landing motor live", None),
-            ("HOLD: no countdown; start anew or it disarms in 60 s", None),
+            ("HOLD: no countdown; start again or it disarms in 60 s", None),
         ];
         for (text, expected) in cases {
             let found = check_of(text).map(|check| (check, in_short(text, check)));

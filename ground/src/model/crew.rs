@@ -147,7 +147,7 @@ pub struct Proposal {
 }
 
 impl Proposal {
-    /// As in `asks to arm`.
+    /// As in `requests to arm`.
     pub fn act_name(&self) -> &'static str {
         if self.act == TdAct::TD_ACT_START { "start" } else { "arm" }
     }

@@ -85,7 +85,7 @@ const NAMES: &[(&str, Takes)] = {
             Some(Vehicle(Fault::Swapped { surfaces }))
         })),
         ("gimbal-stuck", Nothing(Vehicle(Fault::GimbalStuck))),
-        ("brown-out", Value("s without current for servos and igniters, 0 to 10", |s| {
+        ("brown-out", Value("s, 0 to 10", |s| {
             Some(Vehicle(Fault::BrownOut { lasts_s: within(s, 0.0, 10.0)? }))
         })),
         ("gimbal-jams", Value("deg, -90 to 90", |deg| Some(Vehicle(Fault::GimbalJams { deg: within(deg, -90.0, 90.0)? })))),

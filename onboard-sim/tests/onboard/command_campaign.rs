@@ -31,7 +31,7 @@ fn a_wrong_request_is_refused_with_the_reason() {
         (&["--out", "x", "--flights", "-5"], "'-5' for '--flights <N>': must be a whole number from 1 to"),
         (&["--out", "x", "--seed", "abc"], "'abc' for '--seed <SEED>': must be a whole number from 0 to"),
         (&["--out", "x", "--dispersion", "windy"], "neither a built-in set of dispersions"),
-        (&["--out", "x", "--mission", "mk9"], "nor a readable file; did you mean `mk2`?"),
+        (&["--out", "x", "--mission", "mk9"], "vlr; did you mean `mk2`?) nor a readable file"),
         (&["--out", "x", "--fault", "gnss@5"], "no fault is named"),
         (&["--only", "1", "--jobs", "2"], "cannot be used with"),
         (&[], "--out"),

@@ -242,7 +242,7 @@ impl Computer {
         let may_hold = mode.may_hold_for(HoldCause::Commanded, start, time_s);
         if let (CrewCommand::Hold, true, Some(station)) = (command, may_hold, station) {
             let who = by.map_or_else(String::new, |by| format!("{by}, "));
-            self.table.report(Severity::Notice, format!("{who}station {station} asks for a hold"));
+            self.table.report(Severity::Notice, format!("{who}station {station} requests a hold"));
         }
         // A request that the phase table would refuse needs no second person's confirmation.
         let refusal = transition(&mode, event, time_s).refusal;
@@ -488,7 +488,7 @@ fn proposal_text(proposal: &Proposal, time_s: f64) -> String {
     let [one, other] = [others.next(), others.next()].map(|role| role.map_or("", |role| role.name()));
     let left_s = proposal.left_s(time_s).clamp(0.0, CONFIRM_WITHIN_S);
     let Proposal { act, by, .. } = proposal;
-    format!("{by} asks to {}: {one} or {other} must confirm within {left_s:.0} s", act.name())
+    format!("{by} requests to {}: {one} or {other} must confirm within {left_s:.0} s", act.name())
 }
 
 fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {

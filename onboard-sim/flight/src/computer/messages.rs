@@ -53,7 +53,7 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
         severity,
         match effect {
             E::StartCountdown => format!("{words}: release in {countdown_s} s"),
-            E::HoldCountdown => format!("{words}; start anew or it disarms in {HOLD_LIMIT_S} s"),
+            E::HoldCountdown => format!("{words}; start again or it disarms in {HOLD_LIMIT_S} s"),
             _ => words.to_owned(),
         },
     ))

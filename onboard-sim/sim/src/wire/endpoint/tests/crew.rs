@@ -187,7 +187,7 @@ fn one_proposes_another_confirms_and_both_are_named() {
     let (answer, words) = launch.propose(FLIGHT, ARM);
     assert_eq!(answer, NOT_NOW);
     assert!(
-        words.contains("FLIGHT Bob asks to arm: RANGE SAFETY or PAD must confirm within 10 s"),
+        words.contains("FLIGHT Bob requests to arm: RANGE SAFETY or PAD must confirm within 10 s"),
         "{words}"
     );
     let crew = launch.crew.clone().unwrap();

@@ -304,7 +304,7 @@ fn any_station_holds_by_command_and_repeats_it_without_a_complaint() {
         assert_eq!(pad.request(OTHER, HOLD, 0.0), DENIED, "nothing to hold");
         pad.count_down();
         assert_eq!(pad.request(OTHER, HOLD, 0.0), ACCEPTED);
-        assert_eq!((pad.counting(), pad.message_count("station 254/190 asks for a hold")), (false, 1));
+        assert_eq!((pad.counting(), pad.message_count("station 254/190 requests a hold")), (false, 1));
         assert_eq!(pad.status().hold, TdHold::TD_HOLD_COMMANDED);
         let complaints = pad.message_count("refused");
         for _ in 0..10 {
