@@ -187,7 +187,7 @@ mod tests {
             ("connect = [\"tcp\"]", "connect", "udpin:ADDRESS:PORT"),
             ("theme = \"blue\"", "theme", "light"),
             ("sysid = 0", "sysid", "from 1 to 255"),
-            ("vehicle_sysid = 256", "vehicle_sysid", "1..=255"),
+            ("vehicle_sysid = 256", "vehicle_sysid", "from 1 to 255"),
             ("key = []", "key", "a text"),
             ("log = true", "log", "a text"),
             ("connect = [1.5]", "connect", "a text"),
