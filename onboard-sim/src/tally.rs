@@ -148,7 +148,7 @@ impl Tally {
             apogee_speed_m_s: libm::hypot(apogee.velocity_m_s.x, apogee.velocity_m_s.y),
             apogee_tilt_deg: apogee.tilt_rad().to_degrees(),
             apogee_rate_deg_s: libm::sqrt(apogee.rate_rad_s.norm_squared()).to_degrees(),
-            parachute: world.parachute_ejected(),
+            parachute: world.parachute_ejected_s().is_some(),
             burn_time_at_contact_s: touchdown
                 .zip(world.thrust_begins_s())
                 .map(|(touchdown, begins_s)| touchdown.time_s - begins_s)

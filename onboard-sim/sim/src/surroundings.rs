@@ -152,7 +152,7 @@ impl Surroundings {
             phase,
             ignited,
             motor_started: self.world.thrust_begins_s().is_some(),
-            parachute: self.world.parachute_ejected(),
+            parachute: self.world.parachute_ejected_s().is_some(),
             finite: self.finite,
         };
         judge(mission, &ending)

@@ -81,7 +81,7 @@ fn fly_with(mission: &str, dispersion: &str, faults: &[String], seed: u64) -> Fl
         if !flight.computer().mode().phase.before_apogee() {
             apogee_m_s.get_or_insert(up_m_s);
         }
-        if flight.world().parachute_ejected() {
+        if flight.world().parachute_ejected_s().is_some() {
             ejected_m_s.get_or_insert(up_m_s);
         }
     }

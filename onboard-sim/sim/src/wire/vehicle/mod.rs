@@ -193,7 +193,7 @@ impl Vehicle {
                 left: Some(battery.charge()),
             }),
             rehearsed: sortie.rehearsed().map(|(_, report)| report),
-            parachute_ejected: sortie.world().parachute_ejected(),
+            parachute_ejected: sortie.world().parachute_ejected_s().is_some(),
             judged: self.judged(),
         }
     }

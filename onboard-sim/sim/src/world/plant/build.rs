@@ -11,7 +11,7 @@ use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::riding::Stack;
-use super::{AirHere, World, force_at_rest_m_s2};
+use super::{AirHere, Inertial, World, force_at_rest_m_s2};
 use crate::world::aero::{Parachute, Shape};
 use crate::world::ground::Ground;
 use crate::world::hanging::Hanging;
@@ -102,13 +102,11 @@ impl World {
                 .over_height(truth.wind_exponent, truth.wind_veer_rad_m),
             ground: Ground::new(airframe, truth.ground_rise),
             steps: 0,
-            strode: 1,
             state: *initial,
             burnt_kg: 0.0,
             mass: mass_model.at(0.0),
             mass_model,
-            specific_force_m_s2: Vector3::zeros(),
-            angular_acceleration_rad_s2: Vector3::zeros(),
+            inertial: Inertial { steps: 1, ..Inertial::default() },
             touchdown: None,
             rest: None,
             stack: None,
@@ -144,7 +142,7 @@ impl World {
             world_from_body: lean * standing.world_from_body,
             ..standing
         };
-        self.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
+        self.inertial.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
         self.stack = Some(Box::new(Stack::new(launch, truth)));
         self
     }
@@ -152,7 +150,7 @@ impl World {
     /// The same world with the vehicle below a drone.
     #[must_use]
     pub fn hanging(mut self, hanging: Hanging) -> Self {
-        (self.state, self.specific_force_m_s2) = hanging.at(0.0);
+        (self.state, self.inertial.specific_force_m_s2) = hanging.at(0.0);
         self.hanging = Some(hanging);
         self
     }

@@ -96,15 +96,12 @@ pub struct World {
     air: AirHere,
     ground: Ground,
     steps: u64,
-    /// Steps of the last stride.
-    strode: usize,
     state: RigidState,
     /// Landing propellant burnt up to the middle of the last step, kg, and the remaining weight of
     /// the vehicle.
     burnt_kg: f64,
     mass: MassProperties,
-    specific_force_m_s2: Vector3<f64>,
-    angular_acceleration_rad_s2: Vector3<f64>,
+    inertial: Inertial,
     touchdown: Option<FirstContact>,
     rest: Option<Rest>,
     /// The booster with all that belongs to it, until it is separated.
@@ -112,6 +109,20 @@ pub struct World {
     separated_s: Option<f64>,
     /// How it hangs, until it is let go.
     hanging: Option<Hanging>,
+}
+
+/// Means over the last stride in body axes, as measured by an ideal inertial unit at the centre of
+/// gravity.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Inertial {
+    /// Steps of the stride.
+    pub steps: usize,
+    /// Angular rate, rad/s.
+    pub rate_rad_s: Vector3<f64>,
+    /// Acceleration less gravity, m/s^2.
+    pub specific_force_m_s2: Vector3<f64>,
+    /// Angular acceleration, rad/s^2.
+    pub angular_acceleration_rad_s2: Vector3<f64>,
 }
 
 /// The air's density near a height.
@@ -216,16 +227,17 @@ impl World {
         let wind_changes = self.steps.is_multiple_of(STRIDE as u64);
         let long = most >= LONG_STRIDE && self.parachute.open_share() >= 1.0;
         let may_stride = most >= STRIDE && wind_changes && self.may_stride();
-        self.strode = if !may_stride {
+        self.inertial.steps = if !may_stride {
             1
         } else if long {
             LONG_STRIDE
         } else {
             STRIDE
         };
-        let (from_s, over_s) = (self.time_s(), STEP_S * self.strode as f64);
+        let (from_s, over_s) = (self.time_s(), STEP_S * self.inertial.steps as f64);
         let airspeed_m_s = self.air_velocity_m_s().norm_squared().sqrt();
-        for step in 0..self.strode {
+        let mut late_rad_s = Vector3::zeros();
+        for step in 0..self.inertial.steps {
             let time_s = self.time_s();
             self.command(actuators, time_s);
             self.steps += 1;
@@ -233,8 +245,8 @@ impl World {
                 break;
             }
             if let Some(hanging) = &self.hanging {
-                (self.state, self.specific_force_m_s2) = hanging.at(time_s + STEP_S);
-                self.angular_acceleration_rad_s2 = Vector3::zeros();
+                (self.state, self.inertial.specific_force_m_s2) = hanging.at(time_s + STEP_S);
+                self.inertial.angular_acceleration_rad_s2 = Vector3::zeros();
                 break;
             }
             self.parachute.step(time_s, airspeed_m_s);
@@ -248,26 +260,30 @@ impl World {
                 self.mass = self.mass_model.at(self.burnt_kg * self.truth.mass_scale);
             }
             if self.stack.is_none() {
-                self.turn_back();
+                // Earlier steps of the stride are without it.
+                late_rad_s += self.turn_back() * (step as f64 / self.inertial.steps as f64);
             }
             // Servo angles and open parachute of a stride are those in its middle.
-            if step == self.strode / 2 {
+            if step == self.inertial.steps / 2 {
                 self.move_on(from_s, over_s);
             }
         }
-        self.strode
+        let half_s = 0.5 * STEP_S * (self.inertial.steps - 1) as f64;
+        self.inertial.rate_rad_s =
+            self.state.rate_rad_s - self.inertial.angular_acceleration_rad_s2 * half_s - late_rad_s;
+        self.inertial.steps
     }
 
     fn move_on(&mut self, from_s: f64, over_s: f64) {
         if let Some(stack) = self.stack.take() {
-            self.ride(*stack, from_s, over_s, self.strode.min(STRIDE));
+            self.ride(*stack, from_s, over_s, self.inertial.steps.min(STRIDE));
             return;
         }
         let near = || self.ground.clearance_m(&self.state, &self.cg_m()) < NEAR_M;
-        if self.strode == 1 && (self.touchdown.is_some() || near()) {
+        if self.inertial.steps == 1 && (self.touchdown.is_some() || near()) {
             self.move_near_ground(from_s);
         } else {
-            self.move_by(from_s, over_s, self.strode.min(STRIDE));
+            self.move_by(from_s, over_s, self.inertial.steps.min(STRIDE));
         }
     }
 
@@ -370,14 +386,16 @@ impl World {
     }
 
     /// The body turns the other way when the motor begins to swing and when it stops: their common
-    /// angular momentum is conserved.
-    fn turn_back(&mut self) {
+    /// angular momentum is conserved. Returns the change of the rate, rad/s.
+    fn turn_back(&mut self) -> Vector3<f64> {
         let [before_rad_s, now_rad_s] = self.gimbal_rates_rad_s;
         let swinging_kg_m2 =
             self.airframe.swinging_kg_m2(&self.certified, self.motor_kg(), self.mass.cg_station_m);
         let share = swinging_kg_m2 / (self.mass.pitch_inertia_kg_m2 * self.truth.inertia_scale);
-        self.state.rate_rad_s.y -= share * (now_rad_s[0] - before_rad_s[0]);
-        self.state.rate_rad_s.z -= share * (now_rad_s[1] - before_rad_s[1]);
+        let change = [0, 1].map(|axis: usize| share * (before_rad_s[axis] - now_rad_s[axis]));
+        let change_rad_s = Vector3::new(0.0, change[0], change[1]);
+        self.state.rate_rad_s += change_rad_s;
+        change_rad_s
     }
 
     /// The exhaust's effect on the drag.
@@ -435,8 +453,8 @@ impl World {
     }
 
     fn set_moved(&mut self, (state, specific_force_m_s2): (RigidState, Vector3<f64>), step_s: f64) {
-        self.angular_acceleration_rad_s2 = (state.rate_rad_s - self.state.rate_rad_s) / step_s;
-        self.specific_force_m_s2 = specific_force_m_s2;
+        self.inertial.angular_acceleration_rad_s2 = (state.rate_rad_s - self.state.rate_rad_s) / step_s;
+        self.inertial.specific_force_m_s2 = specific_force_m_s2;
         self.state = state;
     }
 
@@ -464,8 +482,8 @@ impl World {
                 None => step(&Acting { ground: Some(ground), ..self.acting(time_s, part_s, 1) }),
             };
             self.set_moved(moved, part_s);
-            specific_force += self.specific_force_m_s2;
-            angular_acceleration += self.angular_acceleration_rad_s2;
+            specific_force += self.inertial.specific_force_m_s2;
+            angular_acceleration += self.inertial.angular_acceleration_rad_s2;
             let contact = self.ground.contact(&self.state, &self.cg_m());
             if self.touchdown.is_none() && (contact.feet > 0 || contact.hull) {
                 // The last state before contact: within this part the feet have already pushed.
@@ -481,8 +499,8 @@ impl World {
                 }
             }
         }
-        self.specific_force_m_s2 = specific_force / parts as f64;
-        self.angular_acceleration_rad_s2 = angular_acceleration / parts as f64;
+        self.inertial.specific_force_m_s2 = specific_force / parts as f64;
+        self.inertial.angular_acceleration_rad_s2 = angular_acceleration / parts as f64;
     }
 
     fn touchdown_at(&self, time_s: f64, state: &RigidState) -> FirstContact {
@@ -502,8 +520,8 @@ impl World {
         self.rest = Some(Rest { time_s, outcome, tilt_rad, strain });
         self.state.velocity_m_s = Vector3::zeros();
         self.state.rate_rad_s = Vector3::zeros();
-        self.angular_acceleration_rad_s2 = Vector3::zeros();
-        self.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
+        self.inertial.angular_acceleration_rad_s2 = Vector3::zeros();
+        self.inertial.specific_force_m_s2 = force_at_rest_m_s2(&self.state);
     }
 }
 
@@ -525,11 +543,6 @@ impl World {
         self.steps
     }
 
-    /// Steps from the last but one moment to this one.
-    pub fn strode(&self) -> usize {
-        self.strode
-    }
-
     /// The vehicle's state; its position is that of the centre of gravity.
     pub fn state(&self) -> &RigidState {
         &self.state
@@ -545,15 +558,9 @@ impl World {
         self.airframe.above_feet_m(self.cg_m().x)
     }
 
-    /// Mean specific force over the last stride in body axes, m/s^2, as measured by an ideal
-    /// accelerometer at the centre of gravity.
-    pub fn specific_force_m_s2(&self) -> &Vector3<f64> {
-        &self.specific_force_m_s2
-    }
-
-    /// Mean angular acceleration over the last stride in body axes, rad/s^2.
-    pub fn angular_acceleration_rad_s2(&self) -> &Vector3<f64> {
-        &self.angular_acceleration_rad_s2
+    /// The last stride.
+    pub fn inertial(&self) -> &Inertial {
+        &self.inertial
     }
 
     /// Mass, centre of gravity and inertia now.
@@ -615,11 +622,6 @@ impl World {
     /// The air at the vehicle.
     pub fn air(&self) -> Air {
         self.site.air_at_m(self.state.position_m.z)
-    }
-
-    /// Whether the parachute was ejected.
-    pub fn parachute_ejected(&self) -> bool {
-        self.parachute.ejected_s().is_some()
     }
 
     /// Whether the wire between booster and vehicle is intact.

@@ -62,10 +62,10 @@ impl World {
         } else {
             body::rk4_divided(&before, &mass.inertia, &acting, STANDARD_GRAVITY_M_S2, step_s, parts)
         };
-        self.angular_acceleration_rad_s2 = (after.rate_rad_s - before.rate_rad_s) / step_s;
+        self.inertial.angular_acceleration_rad_s2 = (after.rate_rad_s - before.rate_rad_s) / step_s;
         let rate = after.rate_rad_s;
-        self.specific_force_m_s2 = felt_m_s2
-            + self.angular_acceleration_rad_s2.cross(&from_stack_m)
+        self.inertial.specific_force_m_s2 = felt_m_s2
+            + self.inertial.angular_acceleration_rad_s2.cross(&from_stack_m)
             + rate.cross(&rate.cross(&from_stack_m));
         self.state = at_offset(&after, &from_stack_m);
         let now_s = time_s + step_s;

@@ -65,7 +65,7 @@ impl Sensors {
     pub(super) fn watch_satellites(&mut self, truth: &SensorTruth, out: bool) {
         let gnss = &self.params.gnss;
         let ago_ms = (self.elapsed_ms + gnss.period_ms - self.gnss_phase_ms) % gnss.period_ms;
-        if ago_ms >= truth.since_ms {
+        if ago_ms >= truth.inertial.steps as u32 {
             return;
         }
         let now_ms = self.elapsed_ms - ago_ms;
@@ -141,7 +141,7 @@ impl Flaws {
 
 /// The motion some time ago, s, under the present acceleration.
 fn moved_back(truth: &SensorTruth, older_s: f64) -> RigidState {
-    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
+    let mut acceleration_m_s2 = truth.state.world_from_body * truth.inertial.specific_force_m_s2;
     acceleration_m_s2.z -= GRAVITY_M_S2;
     RigidState {
         position_m: truth.state.position_m - truth.state.velocity_m_s * older_s,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::Flaws;
 use super::{SensorParams, SensorTruth, Sensors};
+use crate::world::plant::Inertial;
 
 flight::with_defaults! {
     /// Inertial measurement unit.
@@ -54,11 +55,12 @@ flight::with_defaults! {
 impl Sensors {
     /// Specific force at the inertial unit: that of the centre of gravity, plus the effect of
     /// rotation (Stevens and Lewis, chapter 1).
-    pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth, rate: &Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn force_at_unit_m_s2(&self, truth: &SensorTruth) -> Vector3<f64> {
+        let Inertial { rate_rad_s: rate, specific_force_m_s2, angular_acceleration_rad_s2, .. } =
+            truth.inertial;
         let lever_m = self.places.lever_arms(&truth.cg_m).imu_m + self.flaws.unit_m;
-        truth.specific_force_m_s2
-            + truth.angular_acceleration_rad_s2.cross(&lever_m)
-            + rate.cross(&rate.cross(&lever_m))
+        let turning_m_s2 = angular_acceleration_rad_s2.cross(&lever_m) + rate.cross(&rate.cross(&lever_m));
+        specific_force_m_s2 + turning_m_s2
     }
 
     pub(super) fn imu(&mut self, burning: bool) -> ImuSample {

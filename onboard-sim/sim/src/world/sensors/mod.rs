@@ -31,7 +31,7 @@ use self::noise::{Flaws, Wander};
 pub use self::params::{SensorParamError, SensorParams};
 pub use self::switches::SwitchParams;
 use crate::world::normal::Normal;
-use crate::world::plant::World;
+use crate::world::plant::{Inertial, World};
 
 const MS_S: f64 = 1e-3;
 /// Factor on the sensor errors for a flight with nearly exact sensors. It is not zero, because a
@@ -46,10 +46,8 @@ const REACQUIRED_MS: u32 = 1500;
 pub struct SensorTruth {
     /// Position, velocity, attitude and rotation; the position is the centre of gravity's.
     pub state: RigidState,
-    /// Time since the truth before, ms. Forces and angular acceleration are means over it.
-    pub since_ms: u32,
-    /// Acceleration less gravity at the centre of gravity, body axes, m/s^2.
-    pub specific_force_m_s2: Vector3<f64>,
+    /// Means since the truth before; a step takes a millisecond.
+    pub inertial: Inertial,
     /// Speed through the air, m/s.
     pub airspeed_m_s: f64,
     /// The part of it across the axis, m/s.
@@ -58,8 +56,6 @@ pub struct SensorTruth {
     pub cg_over_feet_m: f64,
     /// Centre of gravity: its station, and its distance from the axis, m.
     pub cg_m: Vector3<f64>,
-    /// Angular acceleration, body axes, rad/s^2.
-    pub angular_acceleration_rad_s2: Vector3<f64>,
     /// Height of the ground where the lidar's beam meets it, m.
     pub ground_m: f64,
     /// The motor burns.
@@ -83,13 +79,16 @@ impl SensorTruth {
     ) -> Self {
         Self {
             state: *state,
-            since_ms: 1,
-            specific_force_m_s2: *specific_force_m_s2,
+            inertial: Inertial {
+                steps: 1,
+                rate_rad_s: state.rate_rad_s,
+                specific_force_m_s2: *specific_force_m_s2,
+                ..Inertial::default()
+            },
             airspeed_m_s,
             airspeed_across_m_s: 0.0,
             cg_over_feet_m,
             cg_m: Vector3::zeros(),
-            angular_acceleration_rad_s2: Vector3::zeros(),
             ground_m: 0.0,
             burning: false,
             ejected_for_s: None,
@@ -102,13 +101,11 @@ impl SensorTruth {
         let in_body = world.state().world_from_body.inverse_transform_vector(&world.air_velocity_m_s());
         Self {
             state: *world.state(),
-            since_ms: world.strode() as u32,
+            inertial: *world.inertial(),
             airspeed_across_m_s: libm::hypot(in_body.y, in_body.z),
-            specific_force_m_s2: *world.specific_force_m_s2(),
             airspeed_m_s: world.air_velocity_m_s().norm(),
             cg_over_feet_m: world.cg_above_feet_m(),
             cg_m: world.cg_m(),
-            angular_acceleration_rad_s2: *world.angular_acceleration_rad_s2(),
             ground_m: world.ground_under_beam_m(),
             burning: world.thrust_n() > 0.0 || world.booster_thrust_n() > 0.0,
             ejected_for_s: world
@@ -230,11 +227,10 @@ impl Sensors {
     /// Measures the truth after some more milliseconds; returns a frame's measurements after every
     /// fifth.
     pub fn observe(&mut self, truth: &SensorTruth) -> Option<Measurements> {
-        self.elapsed_ms += truth.since_ms;
-        let (milliseconds, back_s) = (f64::from(truth.since_ms), 0.5 * MS_S * f64::from(truth.since_ms - 1));
-        let rate_rad_s = truth.state.rate_rad_s - truth.angular_acceleration_rad_s2 * back_s;
-        self.rate_sum_rad_s += rate_rad_s * milliseconds;
-        self.force_sum_m_s2 += self.force_at_unit_m_s2(truth, &rate_rad_s) * milliseconds;
+        let milliseconds = truth.inertial.steps as f64;
+        self.elapsed_ms += truth.inertial.steps as u32;
+        self.rate_sum_rad_s += truth.inertial.rate_rad_s * milliseconds;
+        self.force_sum_m_s2 += self.force_at_unit_m_s2(truth) * milliseconds;
         if truth.boosted {
             if self.boosted_ms.is_none() && self.params.gnss.stale_s > 0.0 {
                 self.hold_fixes(&truth.state, self.params.gnss.stale_s);

@@ -193,8 +193,8 @@ fn val_hand_an_offset_unit_senses_the_rotation_and_a_rotated_one_mixes_the_axes(
     let mut sensors = flawed(&quiet());
     sensors.flaws.unit_m = Vector3::new(0.1, 0.0, 0.0);
     let mut truth = falling(10.0, 50.0);
-    truth.state.rate_rad_s = Vector3::new(0.0, 0.0, 2.0);
-    truth.angular_acceleration_rad_s2 = Vector3::new(0.0, 0.0, 5.0);
+    truth.inertial.rate_rad_s = Vector3::new(0.0, 0.0, 2.0);
+    truth.inertial.angular_acceleration_rad_s2 = Vector3::new(0.0, 0.0, 5.0);
     // Centripetal -w^2 r along x, tangential a r along y.
     let measured = one_frame(&mut sensors, &truth).imu.specific_force_m_s2;
     assert!((measured - Vector3::new(9.8 - 0.4, 0.1 + 0.5, -0.2)).norm() < 1e-12, "{measured}");
@@ -335,7 +335,7 @@ fn a_fix_of_unknown_age_is_off_along_the_motion() {
     let older_s = moved_m.z / 40.0;
     assert!(older_s.abs() > 1e-4 && older_s.abs() < 0.1, "{older_s}");
     assert!(moved_m.xy().norm() < 1e-12);
-    let mut acceleration_m_s2 = truth.state.world_from_body * truth.specific_force_m_s2;
+    let mut acceleration_m_s2 = truth.state.world_from_body * truth.inertial.specific_force_m_s2;
     acceleration_m_s2.z -= GRAVITY_M_S2;
     assert!((gained_m_s + acceleration_m_s2 * older_s).norm() < 1e-12, "{gained_m_s}");
 }

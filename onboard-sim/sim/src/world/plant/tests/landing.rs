@@ -32,7 +32,7 @@ fn a_standing_vehicle_rests_on_its_legs_and_its_accelerometer_measures_gravity()
     // 30.7 N on four springs of 2,000 N/m.
     let sunk_m = world.weight_n() / (4.0 * 2000.0);
     assert!((world.height_m() + sunk_m).abs() < 1e-3, "{}", world.height_m());
-    let measured = world.specific_force_m_s2() - Vector3::new(STANDARD_GRAVITY_M_S2, 0.0, 0.0);
+    let measured = world.inertial().specific_force_m_s2 - Vector3::new(STANDARD_GRAVITY_M_S2, 0.0, 0.0);
     assert!(measured.norm() < 1e-6, "{measured}");
     let touchdown = world.touchdown().unwrap();
     let fallen_m_s = (2.0 * STANDARD_GRAVITY_M_S2 * 0.02).sqrt();

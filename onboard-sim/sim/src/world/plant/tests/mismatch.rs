@@ -16,7 +16,7 @@ fn air_n(truth: &Truth, lit: bool) -> f64 {
     world.advance(if lit { &IGNITING } else { &OPEN }, 500);
     (world.state.position_m, world.state.velocity_m_s) = (state.position_m, state.velocity_m_s);
     world.step(if lit { &IGNITING } else { &OPEN });
-    world.specific_force_m_s2().x * world.mass().mass_kg - world.thrust_n()
+    world.inertial().specific_force_m_s2.x * world.mass().mass_kg - world.thrust_n()
 }
 
 #[test]
@@ -53,7 +53,10 @@ fn val_hand_inertia_and_gimbal_gain_change_the_turning() {
         let mut world = world("mk2", &truth, &RigidState::upright(100.0));
         world.advance(&Actuators { gimbal_rad: [0.03, 0.0], ..IGNITING }, 400);
         let gimbal_rad = world.gimbal_rad()[0];
-        (gimbal_rad, world.angular_acceleration_rad_s2().y / world.thrust_n() / libm::sin(gimbal_rad))
+        (
+            gimbal_rad,
+            world.inertial().angular_acceleration_rad_s2.y / world.thrust_n() / libm::sin(gimbal_rad),
+        )
     };
     let (nominal_rad, nominal) = turning(&Truth::default());
     let (gained_rad, gained) = turning(&Truth { gimbal_gain: 1.1, inertia_scale: 1.25, ..Truth::default() });

@@ -104,7 +104,7 @@ fn val_landing_paper_fig_5() {
     let mut worst_deg = [0.0_f64; 5];
     let mut felt_before_contact = Vector3::zeros();
     while world.touchdown().is_none() {
-        felt_before_contact = *world.specific_force_m_s2();
+        felt_before_contact = world.inertial().specific_force_m_s2;
         world.step(&OPEN);
         let band = (world.state().position_m.z / 200.0).clamp(0.0, 4.0) as usize;
         worst_deg[band] = worst_deg[band].max(world.state().tilt_rad().to_degrees());
@@ -135,7 +135,8 @@ fn val_coesa_1976_terminal_speed_at_3000_m() {
         while world.state().position_m.z > 2.0 {
             world.step(&OPEN);
         }
-        -world.state().velocity_m_s.z * libm::sqrt(STANDARD_GRAVITY_M_S2 / world.specific_force_m_s2().norm())
+        -world.state().velocity_m_s.z
+            * libm::sqrt(STANDARD_GRAVITY_M_S2 / world.inertial().specific_force_m_s2.norm())
     };
     let sea_level_m_s = terminal_m_s(0.0, None);
     let ratio = terminal_m_s(3_000.0, None) / sea_level_m_s;
@@ -165,7 +166,10 @@ fn energy_is_conserved_without_air() {
     world.advance(&Actuators::default(), 5000);
     let after_j = energy_j(&world);
     assert!((after_j / before_j - 1.0).abs() < 1e-10, "{before_j} {after_j}");
-    assert!(world.specific_force_m_s2().norm() < 1e-12, "an accelerometer in free fall measures nothing");
+    assert!(
+        world.inertial().specific_force_m_s2.norm() < 1e-12,
+        "an accelerometer in free fall measures nothing"
+    );
 }
 
 /// A burn in vacuum, straight up, against the rocket equation with the file's own impulse and
@@ -203,9 +207,9 @@ fn val_gimbal_signs_and_arm() {
         let rate = world.state().rate_rad_s;
         // The most that jet damping takes.
         let slack = 0.02 * rate.norm();
-        let found = world.angular_acceleration_rad_s2()[axis + 1];
+        let found = world.inertial().angular_acceleration_rad_s2[axis + 1];
         assert!((found - expected).abs() < 0.01 * expected.abs() + slack, "axis {axis}: {found} {expected}");
-        assert!(world.angular_acceleration_rad_s2()[2 - axis].abs() < 1e-9);
+        assert!(world.inertial().angular_acceleration_rad_s2[2 - axis].abs() < 1e-9);
     }
 }
 
@@ -244,7 +248,7 @@ fn val_hand_crosswind_on_the_bare_body() {
     let truth = Truth { wind_m_s: 5.0, gust_scale: 0.0, ..Truth::default() };
     let mut world = world("mk2", &truth, &RigidState::upright(10.0));
     world.step(&Actuators::default());
-    let in_world = world.state().world_from_body * world.specific_force_m_s2();
+    let in_world = world.state().world_from_body * world.inertial().specific_force_m_s2;
     let push_n = world.mass().mass_kg * in_world.x;
     assert!((push_n - 0.951).abs() < 0.002 && in_world.y.abs() < 1e-12, "{push_n} N");
 }
