@@ -114,6 +114,14 @@ fn what_broke_is_named_first() {
     assert_eq!(alarms, 0, "{table}");
 }
 
+/// A gyro that leads the gimbal makes it dither, and a gimbal that dithers looks slow.
+#[test]
+fn a_landing_without_any_dispersion_has_no_finding() {
+    let found = all_flown(&Recipe::built_in("mk3", "none").unwrap(), 12);
+    let found = found.iter().flat_map(|(_, found)| found).map(Finding::words);
+    assert_eq!(found.collect::<Vec<_>>(), [""; 0]);
+}
+
 #[test]
 #[ignore = "1,080 flights; prints the table of docs/engineer.md"]
 fn what_broke_is_named_first_in_95_of_100_and_a_landing_is_silent_in_98() {
