@@ -174,6 +174,7 @@ impl TimesyncVehicle {
 fn a_frame_that_a_ground_accepted_is_rejected_after_the_ground_was_killed() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(keygen(folder.path(), "flight.key").code, Some(0));
+    let stamps = folder.path().join("flight.key.ground.stamps");
     // The same address for every run, as a crew would use.
     let address = unshared_address();
     let start = || {
@@ -186,8 +187,15 @@ fn a_frame_that_a_ground_accepted_is_rejected_after_the_ground_was_killed() {
     };
     let mut vehicle = TimesyncVehicle::new(folder.path(), address);
     for _ in 0..3 {
+        let before = std::fs::read(&stamps).unwrap_or_default();
         let station = start();
-        let question = vehicle.request_until_answered();
+        // A slow disk may take longer for the first timestamps of a run than a station waits.
+        let after_the_first = |_| {
+            let is_saved = std::fs::read(&stamps).is_ok_and(|stamps| stamps != before);
+            let question = vehicle.request_until_answered();
+            is_saved.then_some(question)
+        };
+        let question = (0..600).find_map(after_the_first).expect("the timestamps are saved");
         // The station has just acted on it.
         station.signal(Signal::SIGKILL);
         station.wait();

@@ -54,6 +54,22 @@ fn a_countdown_that_silence_has_held_is_started_anew_and_one_that_a_person_has_h
     }
 }
 
+/// The silence began before the station saw the countdown.
+#[test]
+fn a_countdown_that_was_held_before_it_was_seen_is_started_again() {
+    let mut rig = Rig::new(settings(true, false));
+    rig.run(2.0);
+    arms_and_starts(&mut rig);
+    rig.countdown_ms = i32::MAX;
+    rig.hold = TdHold::TD_HOLD_UPLINK_SILENT;
+    rig.run(1.0);
+    rig.take_commands();
+    rig.run(2.0);
+    let again = rig.take_commands();
+    assert!(!again.is_empty(), "{}", rig.events());
+    assert!(again.iter().all(|sent| sent.command == MavCmd::MAV_CMD_MISSION_START), "{again:?}");
+}
+
 #[test]
 fn failing_checks_prevent_arming_and_the_run_ends_with_the_reason() {
     let mut rig = Rig::new(settings(true, false));
