@@ -7,9 +7,8 @@
 //! One list serves three uses: which checks inhibit ignition now, which ones abandon the landing
 //! because they will not recover, and what is reported to the crew about both.
 
-use alloc::format;
-use alloc::string::String;
 
+use crate::text::{Text, text};
 use crate::vehicle::mission::GateLimits;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,9 +106,9 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
 
 impl GateCheck {
     /// The check with its result, as text.
-    pub fn words(&self) -> String {
+    pub fn words(&self) -> Text {
         let Self { name, found, limit, unit, .. } = self;
-        if limit.is_nan() { (*name).into() } else { format!("{name} {found:.0} {unit}, limit {limit:.0}") }
+        if limit.is_nan() { text!("{name}") } else { text!("{name} {found:.0} {unit}, limit {limit:.0}") }
     }
 }
 
