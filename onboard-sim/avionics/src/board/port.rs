@@ -7,12 +7,16 @@
 //! `heapless::spsc`: nothing is shared.
 
 use alloc::boxed::Box;
+use core::mem::swap;
 
-use crate::log::frame::{LoggedInput, frame_to_log};
+use crate::log::frame::{LoggedInput, log_frame_over};
+use crate::log::logged::Logged;
+use flight::computer::crew::ANSWERED;
 use flight::computer::messages::CrewMessage;
+use flight::computer::pad_check::SURFACES;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput, flight_time_s};
-use protocol::records::computer_v1::ComputerFrame;
+use protocol::records::computer_v1::{self, ComputerFrame};
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {
@@ -50,13 +54,16 @@ pub trait Board {
     fn log(&mut self, frame: &ComputerFrame);
 }
 
-/// The frames of a flight.
+/// The frames of a flight. None allocates or frees memory.
 #[derive(Debug)]
 pub struct Frames {
     computer: Computer,
     frame: u64,
     /// For the next frame, which stores it.
     rehearsed: Option<Rehearsed>,
+    /// The same in the log, and the last record, whose memory is used again.
+    rehearsal: Option<computer_v1::Rehearsed>,
+    record: ComputerFrame,
 }
 
 impl Frames {
@@ -65,7 +72,15 @@ impl Frames {
     /// rehearses its landing now, which takes some seconds.
     pub fn new(mut computer: Computer, frame: u64) -> Self {
         let rehearsed = computer.rehearse();
-        Self { computer, frame, rehearsed }
+        let mut record = ComputerFrame::default();
+        let ComputerFrame { input, output, .. } = &mut record;
+        for list in [&mut input.gimbal_rad, &mut input.fins_rad, &mut output.gimbal_rad, &mut output.fins_rad]
+        {
+            list.reserve(SURFACES);
+        }
+        input.requests.reserve(ANSWERED);
+        output.answers.reserve(ANSWERED);
+        Self { computer, frame, rehearsal: rehearsed.as_ref().map(Logged::to_log), rehearsed, record }
     }
 
     /// The computer after the last frame.
@@ -93,7 +108,14 @@ impl Frames {
             board.submit(planner);
         }
         board.send(&output.messages);
-        board.log(&frame_to_log(&input, &output, &self.computer, false));
+        log_frame_over(&mut self.record, &input, &output, &self.computer);
+        if rehearsed.is_some() {
+            swap(&mut self.record.input.rehearsed, &mut self.rehearsal);
+        }
+        board.log(&self.record);
+        if rehearsed.is_some() {
+            swap(&mut self.record.input.rehearsed, &mut self.rehearsal);
+        }
         Ok(true)
     }
 }

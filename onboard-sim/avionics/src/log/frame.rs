@@ -1,8 +1,6 @@
 //! The flight computer's frames as log records, and back, bit for bit.
 
-use alloc::vec::Vec;
-
-use flight::computer::crew::{CrewCommand, Ending, Request};
+use flight::computer::crew::{CrewCommand, Ending, Requests};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput};
 use flight::estimation::estimator::AidStatus;
@@ -18,7 +16,7 @@ use crate::log::logged::{At, Logged, RecordError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedInput {
     pub sensed: SensedInput,
-    pub requests: Vec<Request>,
+    pub requests: Requests,
     pub rehearsed: Option<Rehearsed>,
     pub plan_ready: bool,
 }
@@ -55,21 +53,31 @@ pub fn frame_to_log(
     computer: &Computer,
     rehearsed_before: bool,
 ) -> v1::ComputerFrame {
-    let mut input = input_to_log(input);
-    if rehearsed_before {
-        input.rehearsed = None;
-    }
-    v1::ComputerFrame { input, output: output_to_log(output, computer), state_digest: computer.digest() }
+    let mut record = v1::ComputerFrame::default();
+    log_frame_over(&mut record, input, output, computer);
+    record.input.rehearsed = input.rehearsed.filter(|_| !rehearsed_before).map(Logged::to_log);
+    record
 }
 
-fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-    let &Input { ref sensed, requests, rehearsed, plan_ready } = input;
-    v1::ComputerInput {
-        requests: requests.iter().map(Logged::to_log).collect(),
-        rehearsed: rehearsed.map(Logged::to_log),
-        plan_ready,
-        ..sensed.to_log()
-    }
+/// Writes a frame over an earlier record, whose lists are used again; the result of the rehearsal
+/// stays.
+pub(crate) fn log_frame_over(
+    record: &mut v1::ComputerFrame,
+    input: &Input<'_>,
+    output: &Output,
+    computer: &Computer,
+) {
+    log_input_over(&mut record.input, input);
+    log_output_over(&mut record.output, output, computer);
+    record.state_digest = computer.digest();
+}
+
+fn log_input_over(record: &mut v1::ComputerInput, input: &Input<'_>) {
+    let &Input { ref sensed, requests, rehearsed: _, plan_ready } = input;
+    sensed.log_over(record);
+    record.requests.clear();
+    record.requests.extend(requests.iter().map(Logged::to_log));
+    record.plan_ready = plan_ready;
 }
 
 /// A recorded input.
@@ -78,10 +86,9 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// It has a value that is unknown to this build.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let at = At { frame: input.frame, field: "input" };
-    let requests = input.requests.iter().map(|request| Logged::from_log(request, at));
     Ok(LoggedInput {
         sensed: Logged::from_log(input, at)?,
-        requests: requests.collect::<Result<_, _>>()?,
+        requests: Logged::from_log(&input.requests, at)?,
         rehearsed: Logged::from_log(&input.rehearsed, at)?,
         plan_ready: input.plan_ready,
     })
@@ -96,11 +103,20 @@ pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
 
 /// A frame's output as a record; `computer` has just flown it.
 pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
+    let mut record = v1::ComputerOutput::default();
+    log_output_over(&mut record, output, computer);
+    record
+}
+
+fn log_output_over(record: &mut v1::ComputerOutput, output: &Output, computer: &Computer) {
     let Output { commands, released, answers, messages: _, planned } = output;
     let &Commands { gimbal_rad, fins_rad, outputs } = commands;
-    v1::ComputerOutput {
-        gimbal_rad: gimbal_rad.to_vec(),
-        fins_rad: fins_rad.to_vec(),
+    let mut lists = core::mem::take(record);
+    gimbal_rad.log_over(&mut lists.gimbal_rad);
+    fins_rad.log_over(&mut lists.fins_rad);
+    lists.answers.clear();
+    lists.answers.extend(answers.iter().map(|answer| answer.ending.to_log()));
+    *record = v1::ComputerOutput {
         ignite: outputs.is_on(PyroOutput::LandingIgniter),
         parachute: outputs.is_on(PyroOutput::Parachute),
         released: *released,
@@ -108,10 +124,10 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
-        answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
         ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
         separate_booster: outputs.is_on(PyroOutput::Separation),
-    }
+        ..lists
+    };
 }
 
 /// The commands of a recorded frame.
@@ -185,12 +201,13 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::computer::crew::{CrewCommand, People};
+    use flight::computer::crew::{CrewCommand, People, Request};
     use flight::computer::{Commander, LogState};
     use flight::estimation::estimator::{ImuSample, Measurements};
     use flight::rules::arming::{PredictedLanding, Uplink};
     use flight::rules::operator::{Name, Operator, Role};
     use flight::rules::two_person::Station;
+    use flight::text::text;
     use nalgebra::Vector3;
     use proptest::prelude::*;
     use prost::Message as _;
@@ -263,6 +280,13 @@ mod tests {
         ]
     }
 
+    fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
+        let rehearsed = input.rehearsed.map(Logged::to_log);
+        let mut record = v1::ComputerInput { rehearsed, ..Default::default() };
+        log_input_over(&mut record, input);
+        record
+    }
+
     proptest! {
         #[test]
         fn an_input_survives_the_log_bit_for_bit(
@@ -288,8 +312,8 @@ mod tests {
             };
             let rehearsed = rehearsed.map(|(warm, found, landing)| Rehearsed {
                 warm,
-                found,
-                landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
+                found: text!("{found}"),
+                landing: landing.map(|(lands, found)| PredictedLanding { lands, found: text!("{found}") }),
             });
             let sensed = SensedInput {
                 frame,

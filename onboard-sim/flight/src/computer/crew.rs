@@ -101,8 +101,12 @@ pub struct Answer {
     pub reason: Option<Text>,
 }
 
-/// The answers of a frame. Requests beyond these are decided, and not answered.
-pub type Answers = ArrayVec<Answer, 16>;
+/// Requests that a frame answers. More are decided, and not answered.
+pub const ANSWERED: usize = 16;
+/// Requests of a frame, in order.
+pub type Requests = ArrayVec<Request, ANSWERED>;
+/// The answers to them.
+pub type Answers = ArrayVec<Answer, ANSWERED>;
 
 impl Answer {
     pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
@@ -424,8 +428,7 @@ impl Computer {
         // NaN is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
         let held = if is_heard {
-            deaf && self
-                .hold(HoldCause::StationDeaf, || text!("{station} receives nothing of this vehicle"))
+            deaf && self.hold(HoldCause::StationDeaf, || text!("{station} receives nothing of this vehicle"))
         } else {
             let why = || text!("nothing received from {station} for {UPLINK_SILENT_S} s");
             self.hold(HoldCause::UplinkSilent, why)
@@ -505,11 +508,7 @@ fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> Text {
             text!("{} requested it: another role must confirm", proposal.by)
         }
         NoAgreement::SameRole(proposal) => {
-            text!(
-                "{} requested it: another role than {} must confirm",
-                proposal.by,
-                proposal.by.role.name()
-            )
+            text!("{} requested it: another role than {} must confirm", proposal.by, proposal.by.role.name())
         }
     }
 }

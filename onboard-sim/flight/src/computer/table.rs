@@ -12,7 +12,7 @@ use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
 use crate::text::text;
 
-/// Messages of a frame, in order; seven is the most in a nominal flight.
+/// Messages of a frame, in order; three is the most in a nominal flight.
 pub type Messages = ArrayVec<CrewMessage, 16>;
 
 /// Phase, latches, and the messages of this frame.

@@ -88,7 +88,7 @@ pub struct ArmingInput {
 }
 
 /// The arming checks.
-pub type Checks = ArrayVec<Check, 20>;
+pub type Checks = ArrayVec<Check, { 16 + SENSORS.len() }>;
 
 /// Every arming check with its value, in the order in which an operator resolves them.
 pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
@@ -114,10 +114,7 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
     // Before the checks of derived values: the faulty sensor is named, not the value that it
     // spoils.
     checks.extend(
-        SENSORS
-            .into_iter()
-            .zip(&input.sensor_defects)
-            .map(|(name, defect)| Check::sensor(name, *defect)),
+        SENSORS.into_iter().zip(&input.sensor_defects).map(|(name, defect)| Check::sensor(name, *defect)),
     );
     checks.extend([
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
@@ -253,11 +250,7 @@ impl Check {
     pub fn refusal(&self) -> Option<Text> {
         let Self { name, found, required, .. } = self;
         let words = || {
-            if required.is_empty() {
-                *found
-            } else {
-                text!("{name}: found {found}, required {required}")
-            }
+            if required.is_empty() { *found } else { text!("{name}: found {found}, required {required}") }
         };
         (!self.passed).then(words)
     }

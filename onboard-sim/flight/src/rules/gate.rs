@@ -7,7 +7,6 @@
 //! One list serves three uses: which checks inhibit ignition now, which ones abandon the landing
 //! because they will not recover, and what is reported to the crew about both.
 
-
 use crate::text::{Text, text};
 use crate::vehicle::mission::GateLimits;
 

@@ -11,7 +11,6 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
-
 use arrayvec::ArrayVec;
 use serde::Serialize;
 

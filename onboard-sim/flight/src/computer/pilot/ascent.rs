@@ -267,7 +267,8 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
         Event::Burnout => {
             let words = text!(
                 "ascent motor burnt out at {:.0} m, {:.0} m/s",
-                state.position_m.z, state.velocity_m_s.z
+                state.position_m.z,
+                state.velocity_m_s.z
             );
             (Severity::Notice, words)
         }

@@ -4,7 +4,6 @@
 //! It shows whether the planner works on this machine, and whether a landing is possible with this
 //! vehicle, motor and mission.
 
-
 use nalgebra::{Vector2, Vector3};
 
 use super::planner::{Planner, Problem};
