@@ -7,16 +7,17 @@
 //! `heapless::spsc`: nothing is shared.
 
 use alloc::boxed::Box;
-use core::mem::swap;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::mem::{swap, take};
 
-use crate::log::frame::{LoggedInput, log_frame_over};
+use crate::log::frame::{LoggedInput, frame_to_log};
 use crate::log::logged::Logged;
 use flight::computer::crew::ANSWERED;
 use flight::computer::messages::CrewMessage;
-use flight::computer::pad_check::SURFACES;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput, flight_time_s};
-use protocol::records::computer_v1::{self, ComputerFrame};
+use protocol::records::computer_v1::{self, ComputerFrame, ComputerInput, ComputerOutput};
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {
@@ -72,14 +73,11 @@ impl Frames {
     /// rehearses its landing now, which takes some seconds.
     pub fn new(mut computer: Computer, frame: u64) -> Self {
         let rehearsed = computer.rehearse();
-        let mut record = ComputerFrame::default();
-        let ComputerFrame { input, output, .. } = &mut record;
-        for list in [&mut input.gimbal_rad, &mut input.fins_rad, &mut output.gimbal_rad, &mut output.fins_rad]
-        {
-            list.reserve(SURFACES);
-        }
-        input.requests.reserve(ANSWERED);
-        output.answers.reserve(ANSWERED);
+        let input =
+            ComputerInput { requests: Vec::with_capacity(ANSWERED), ..SensedInput::default().to_log() };
+        let (gimbal_rad, fins_rad, answers) = (vec![0.0; 2], vec![0.0; 4], Vec::with_capacity(ANSWERED));
+        let output = ComputerOutput { gimbal_rad, fins_rad, answers, ..ComputerOutput::default() };
+        let record = ComputerFrame { input, output, state_digest: 0 };
         Self { computer, frame, rehearsal: rehearsed.as_ref().map(Logged::to_log), rehearsed, record }
     }
 
@@ -108,14 +106,11 @@ impl Frames {
             board.submit(planner);
         }
         board.send(&output.messages);
-        log_frame_over(&mut self.record, &input, &output, &self.computer);
-        if rehearsed.is_some() {
-            swap(&mut self.record.input.rehearsed, &mut self.rehearsal);
-        }
+        self.record = frame_to_log(&input, &output, &self.computer, true, take(&mut self.record));
+        let rehearsal = if rehearsed.is_some() { &mut self.rehearsal } else { &mut None };
+        swap(&mut self.record.input.rehearsed, rehearsal);
         board.log(&self.record);
-        if rehearsed.is_some() {
-            swap(&mut self.record.input.rehearsed, &mut self.rehearsal);
-        }
+        swap(&mut self.record.input.rehearsed, rehearsal);
         Ok(true)
     }
 }

@@ -46,38 +46,29 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
 }
 
 /// A complete frame as a record; `computer` has just flown it. The result of the rehearsal is
-/// recorded in one frame only: with `rehearsed_before` an earlier frame has it.
+/// recorded in one frame only: with `rehearsed_before` an earlier frame has it. The lists of an
+/// `earlier` record are used again.
 pub fn frame_to_log(
     input: &Input<'_>,
     output: &Output,
     computer: &Computer,
     rehearsed_before: bool,
+    earlier: v1::ComputerFrame,
 ) -> v1::ComputerFrame {
-    let mut record = v1::ComputerFrame::default();
-    log_frame_over(&mut record, input, output, computer);
-    record.input.rehearsed = input.rehearsed.filter(|_| !rehearsed_before).map(Logged::to_log);
-    record
+    let rehearsed = input.rehearsed.filter(|_| !rehearsed_before);
+    v1::ComputerFrame {
+        input: input_to_log(&Input { rehearsed, ..*input }, earlier.input),
+        output: output_to_log(output, computer, earlier.output),
+        state_digest: computer.digest(),
+    }
 }
 
-/// Writes a frame over an earlier record, whose lists are used again; the result of the rehearsal
-/// stays.
-pub(crate) fn log_frame_over(
-    record: &mut v1::ComputerFrame,
-    input: &Input<'_>,
-    output: &Output,
-    computer: &Computer,
-) {
-    log_input_over(&mut record.input, input);
-    log_output_over(&mut record.output, output, computer);
-    record.state_digest = computer.digest();
-}
-
-fn log_input_over(record: &mut v1::ComputerInput, input: &Input<'_>) {
-    let &Input { ref sensed, requests, rehearsed: _, plan_ready } = input;
-    sensed.log_over(record);
+fn input_to_log(input: &Input<'_>, mut record: v1::ComputerInput) -> v1::ComputerInput {
+    let &Input { ref sensed, requests, rehearsed, plan_ready } = input;
+    sensed.log_over(&mut record);
     record.requests.clear();
     record.requests.extend(requests.iter().map(Logged::to_log));
-    record.plan_ready = plan_ready;
+    v1::ComputerInput { rehearsed: rehearsed.map(Logged::to_log), plan_ready, ..record }
 }
 
 /// A recorded input.
@@ -101,22 +92,20 @@ pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
     answered.any(|(request, answer)| request.asked == abort && *answer == accepted)
 }
 
-/// A frame's output as a record; `computer` has just flown it.
-pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
-    let mut record = v1::ComputerOutput::default();
-    log_output_over(&mut record, output, computer);
-    record
-}
-
-fn log_output_over(record: &mut v1::ComputerOutput, output: &Output, computer: &Computer) {
+/// A frame's output as a record; `computer` has just flown it. The lists of an `earlier` record are
+/// used again.
+pub fn output_to_log(
+    output: &Output,
+    computer: &Computer,
+    mut earlier: v1::ComputerOutput,
+) -> v1::ComputerOutput {
     let Output { commands, released, answers, messages: _, planned } = output;
     let &Commands { gimbal_rad, fins_rad, outputs } = commands;
-    let mut lists = core::mem::take(record);
-    gimbal_rad.log_over(&mut lists.gimbal_rad);
-    fins_rad.log_over(&mut lists.fins_rad);
-    lists.answers.clear();
-    lists.answers.extend(answers.iter().map(|answer| answer.ending.to_log()));
-    *record = v1::ComputerOutput {
+    gimbal_rad.log_over(&mut earlier.gimbal_rad);
+    fins_rad.log_over(&mut earlier.fins_rad);
+    earlier.answers.clear();
+    earlier.answers.extend(answers.iter().map(|answer| answer.ending.to_log()));
+    v1::ComputerOutput {
         ignite: outputs.is_on(PyroOutput::LandingIgniter),
         parachute: outputs.is_on(PyroOutput::Parachute),
         released: *released,
@@ -126,8 +115,8 @@ fn log_output_over(record: &mut v1::ComputerOutput, output: &Output, computer: &
         over: computer.is_over(),
         ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
         separate_booster: outputs.is_on(PyroOutput::Separation),
-        ..lists
-    };
+        ..earlier
+    }
 }
 
 /// The commands of a recorded frame.
@@ -280,13 +269,6 @@ mod tests {
         ]
     }
 
-    fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
-        let rehearsed = input.rehearsed.map(Logged::to_log);
-        let mut record = v1::ComputerInput { rehearsed, ..Default::default() };
-        log_input_over(&mut record, input);
-        record
-    }
-
     proptest! {
         #[test]
         fn an_input_survives_the_log_bit_for_bit(
@@ -339,10 +321,10 @@ mod tests {
             };
             let input =
                 Input { sensed, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
-            let bytes = input_to_log(&input).encode_to_vec();
+            let bytes = input_to_log(&input, Default::default()).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
             // Compared as bytes as well, because a NaN never equals itself.
-            prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
+            prop_assert_eq!(input_to_log(&read.input(), Default::default()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
             let fields = |requests: &[Request]| {

@@ -188,16 +188,16 @@ mod tests {
     fn each_change_of_the_motor_in_a_flight_is_reported_once() {
         let mut watch = MotorWatch::default();
         let mut message = |phase, motor, time_s| {
-            watch.update(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)
+            watch.update(&mode(phase, motor, true), time_s).map_or_else(Text::new, |(_, words)| words)
         };
-        assert_eq!(message(Phase::PadIdle, Motor::Unlit, 1.0), "pin out: landing motor live");
-        assert_eq!(message(Phase::PadArmed, Motor::Unlit, 2.0), "");
-        assert_eq!(message(Phase::LandArmed, Motor::Unlit, 3.0), "");
-        assert_eq!(message(Phase::Powered, Motor::Burning, 4.0), "");
+        assert_eq!(message(Phase::PadIdle, Motor::Unlit, 1.0).as_str(), "pin out: landing motor live");
+        assert_eq!(message(Phase::PadArmed, Motor::Unlit, 2.0).as_str(), "");
+        assert_eq!(message(Phase::LandArmed, Motor::Unlit, 3.0).as_str(), "");
+        assert_eq!(message(Phase::Powered, Motor::Burning, 4.0).as_str(), "");
         let burnt_out = Motor::BurntOut { at_s: 9.0 };
-        assert_eq!(message(Phase::Powered, burnt_out, 9.0), "burn-out: motor hot for 60 s");
-        assert_eq!(message(Phase::Touchdown, burnt_out, 10.0), "");
-        assert_eq!(message(Phase::Touchdown, burnt_out, 69.0), "landing motor burnt out and cooled");
-        assert_eq!(message(Phase::Safed, burnt_out, 69.1), "");
+        assert_eq!(message(Phase::Powered, burnt_out, 9.0).as_str(), "burn-out: motor hot for 60 s");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 10.0).as_str(), "");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 69.0).as_str(), "landing motor burnt out and cooled");
+        assert_eq!(message(Phase::Safed, burnt_out, 69.1).as_str(), "");
     }
 }

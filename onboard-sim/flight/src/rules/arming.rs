@@ -291,8 +291,8 @@ mod tests {
             battery_v: Some(ArmingLimits::default().battery_min_v),
             servo_battery_v: Some(ArmingLimits::default().servo_battery_min_v),
             controller_warm: true,
-            controller_found: "converged".to_owned(),
-            predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
+            controller_found: text!("converged"),
+            predicted_landing: Some(PredictedLanding { lands: true, found: Text::new() }),
             uplink: Uplink::Received { age_s: UPLINK_PROVEN_S },
         }
     }
@@ -332,10 +332,10 @@ mod tests {
                 input.is_checking = true;
             }),
             ("no GNSS fix for 9 s", |input| {
-                input.sensor_defects[3] = Some("no GNSS fix for 9 s".to_owned());
+                input.sensor_defects[3] = Some(text!("no GNSS fix for 9 s"));
             }),
             ("lidar silent", |input| {
-                input.sensor_defects[4] = Some("lidar silent for 2 s".to_owned());
+                input.sensor_defects[4] = Some(text!("lidar silent for 2 s"));
             }),
             ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
                 input.tilt_rad = 6.0_f64.to_radians();

@@ -321,29 +321,24 @@ impl Logged for People {
     }
 }
 
-impl Logged for Text {
-    type Record = String;
+/// Types stored in the log as text.
+macro_rules! written {
+    ($($logged:ident: $read:expr),+) => {$(
+        impl Logged for $logged {
+            type Record = String;
 
-    fn to_log(&self) -> String {
-        self.as_str().into()
-    }
+            fn to_log(&self) -> String {
+                self.as_str().into()
+            }
 
-    fn from_log(record: &String, _: At) -> Result<Self, RecordError> {
-        Ok(text!("{record}"))
-    }
+            fn from_log(record: &String, _: At) -> Result<Self, RecordError> {
+                Ok($read(record))
+            }
+        }
+    )+};
 }
 
-impl Logged for Name {
-    type Record = String;
-
-    fn to_log(&self) -> String {
-        self.as_str().into()
-    }
-
-    fn from_log(record: &String, _: At) -> Result<Self, RecordError> {
-        Ok(Self::new(record))
-    }
-}
+written!(Name: Name::new, Text: |words: &str| text!("{words}"));
 
 /// A recorded vector.
 pub fn vector_from_log(vector: &flight_v1::Vector3) -> Vector3<f64> {
