@@ -2,6 +2,7 @@
 //! whether the vehicle receives this station.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TdFrameRefusal};
@@ -139,14 +140,22 @@ impl Link {
 
     /// The state of the downlink. It counts as a vehicle from its first heartbeat.
     pub fn state(&self, now: Duration) -> LinkState {
-        LinkState::of(self.first_heartbeat_at.and(self.last_frame_at), now)
+        let last = self.first_heartbeat_at.and(self.last_frame_at);
+        LinkState::of(last.map(|at| self.uplink.pace.of_the_vehicle(at, now)), now)
     }
 
     /// Takes the time on the vehicle's clock that a message carries.
-    pub(crate) fn date(&mut self, message: &MavMessage, now: Duration) {
+    pub(crate) fn date(&mut self, message: &MavMessage, is_simulated: bool, now: Duration) {
         let clock_ms = time_boot_ms(message).filter(|_| !matches!(message, MavMessage::TIMESYNC(_)));
-        if let Some(clock_ms) = clock_ms {
-            self.content.received(Duration::from_millis(clock_ms.into()), now);
+        if let Some(clock) = clock_ms.map(|clock_ms| Duration::from_millis(clock_ms.into())) {
+            self.content.received(clock, now);
+            self.uplink.pace.measure(clock, now);
+        }
+        if !is_simulated {
+            self.uplink.pace = Pace::default();
+        } else if self.uplink.pace.slow.is_some() {
+            // Its clock would make all content look old.
+            self.content = ContentAge::default();
         }
     }
 
@@ -244,6 +253,40 @@ pub struct Uplink {
     other_session: u32,
     /// The last refused frame.
     pub refused: Option<Refused>,
+    pub(crate) pace: Pace,
+}
+
+/// Time over which a vehicle's clock is compared with ours.
+const PACE_OVER: Duration = Duration::from_secs(5);
+/// A faster clock counts as ours: messages may have been delayed. A slower one than the other is
+/// not followed.
+const PACES: Range<f64> = 1.0 / 16.0..0.8;
+
+/// How fast the clock of a simulated vehicle runs: an emulated chip may take several times as long
+/// for a frame. Only a simulated vehicle has another pace than ours.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Pace {
+    /// The vehicle's clock and ours when the comparison began.
+    since: Option<(Duration, Duration)>,
+    /// Its time in one unit of ours, if it is slow.
+    slow: Option<f64>,
+}
+
+impl Pace {
+    fn measure(&mut self, clock: Duration, now: Duration) {
+        let (began, began_at) = *self.since.get_or_insert((clock, now));
+        let took = now.saturating_sub(began_at);
+        if took >= PACE_OVER {
+            let pace = clock.saturating_sub(began).as_secs_f64() / took.as_secs_f64();
+            let slow = Some(pace.max(PACES.start)).filter(|pace| PACES.contains(pace));
+            *self = Self { since: Some((clock, now)), slow };
+        }
+    }
+
+    /// A past time, as far back as the vehicle's clock has advanced since.
+    pub(crate) fn of_the_vehicle(self, at: Duration, now: Duration) -> Duration {
+        self.slow.map_or(at, |pace| now.saturating_sub(now.saturating_sub(at).mul_f64(pace)))
+    }
 }
 
 impl Uplink {
@@ -290,7 +333,8 @@ impl Uplink {
 
     /// The state of the uplink.
     pub fn state(&self, now: Duration) -> LinkState {
-        LinkState::of(if self.is_reported { self.accepted_at } else { self.answered_at }, now)
+        let last = if self.is_reported { self.accepted_at } else { self.answered_at };
+        LinkState::of(last.map(|at| self.pace.of_the_vehicle(at, now)), now)
     }
 
     /// Whether it is proven that the vehicle receives this station.

@@ -125,7 +125,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
             return;
         }
     }
-    model.link.date(&message, now);
+    model.link.date(&message, model.vehicle.boot.is_simulated(), now);
     match &message {
         MavMessage::STATUSTEXT(chunk) => {
             for text in model.texts.push(frame.source(), chunk, now) {

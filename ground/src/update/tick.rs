@@ -106,7 +106,8 @@ fn needs_fast_heartbeats(model: &Model, now: Duration) -> bool {
 
 /// Whether no telemetry arrives from a vehicle that is armed on the pad, or only stale data.
 fn is_deaf(model: &Model, now: Duration) -> bool {
-    let silent = model.link.last_frame_at.is_none_or(|at| now.saturating_sub(at) >= DEAF_AFTER);
+    let last = model.link.last_frame_at.map(|at| model.link.uplink.pace.of_the_vehicle(at, now));
+    let silent = last.is_none_or(|at| now.saturating_sub(at) >= DEAF_AFTER);
     let old = matches!(model.link.down(now), LinkState::Lost(_));
     model.vehicle.is_armed() && (silent || old)
 }

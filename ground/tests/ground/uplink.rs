@@ -8,7 +8,7 @@ use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA, TdFrameRefusa
 use protocol::identity::{Address, GROUND};
 
 use crate::keys::ladder;
-use crate::rig::{MONO, Rig, is_arm};
+use crate::rig::{MONO, Rig, is_arm, settings};
 
 /// Both directions as every first line shows them.
 fn directions(rig: &Rig) -> String {
@@ -40,6 +40,36 @@ fn a_lost_uplink_is_shown_raises_an_alarm_and_is_no_go() {
     rig.expect_screen("✓ uplink proven");
     rig.keys(&ladder());
     assert!(rig.take_commands().iter().any(is_arm));
+}
+
+/// The link to an emulated vehicle, which takes several times real time, ages by its clock. A real
+/// one is never waited for so long.
+#[test]
+fn a_slow_simulated_vehicle_is_go_and_its_loss_is_reported() {
+    for (slower, simulated) in [(4, true), (10, true), (4, false), (10, false)] {
+        let mut rig = Rig::new(settings(false, true));
+        (rig.slower, rig.simulated) = (slower, simulated);
+        rig.run(20.0);
+        let mut unproven = 0;
+        for _ in 0..100 {
+            rig.run(0.1);
+            unproven += u32::from(
+                !rig.model.link.uplink.is_proven(rig.now) || !directions(&rig).starts_with("down 0s"),
+            );
+        }
+        assert_eq!(
+            unproven == 0,
+            simulated,
+            "{slower} times as long: {unproven} of 100, {}",
+            directions(&rig)
+        );
+        rig.speaks = false;
+        rig.run(2.5 * f64::from(slower));
+        assert_eq!(matches!(rig.model.link.state(rig.now), LinkState::Lost(_)), !simulated, "{slower}");
+        rig.run(1.5 * f64::from(slower));
+        assert!(matches!(rig.model.link.state(rig.now), LinkState::Lost(_)), "{slower}, {simulated}");
+        rig.expect_event("LINK LOST");
+    }
 }
 
 /// The uplink is lost while the word is being typed.

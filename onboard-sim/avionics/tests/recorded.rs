@@ -25,10 +25,6 @@ use sim::recipe::Recipe;
 use sim::sortie::Sortie;
 use sim::wire::record::LastFrame;
 
-/// More than the messages of a frame need, bytes, with their parts: 1,073 at ignition, when the
-/// gate reports all its values.
-const MESSAGE_BYTES_MAX: u64 = 2048;
-
 /// Answers of a board to bytes that arrive a few at a time, as from a serial line.
 fn fly(bytes: &[u8]) -> (Board, Vec<Answer>, Result<(), FlyError>) {
     let (mut board, mut out, mut flown) = (Board::new(VehicleKind::Simulated), Vec::new(), Ok(()));
@@ -265,59 +261,122 @@ fn a_board_that_senses_the_same_commands_the_same() {
     }
 }
 
-/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is
-/// moved by a computer that decides the same in every frame.
-#[test]
-fn a_board_rehearses_arms_and_lands() {
-    let mut sortie = Sortie::on_the_pad(&recipe(), 0).unwrap();
-    let computer = started(&recipe(), &sortie).computer().clone();
-    let (mut frames, mut last, mut armed) = (Vec::new(), LastFrame::default(), false);
-    let requests = |command| [Request::of_the_programme(command)];
-    let (arm, start) = (requests(CrewCommand::Arm), requests(CrewCommand::Start));
-    // The simulated rehearsal is over after some seconds.
+/// A flight from power-up, with these requests of the crew in these frames, and the computer that
+/// began it. The simulated rehearsal is over after some seconds.
+fn flown_from_the_pad(
+    recipe: &Recipe,
+    crew: &[(u64, CrewCommand)],
+) -> (Computer, Sortie, Vec<ComputerFrame>) {
+    let mut sortie = Sortie::on_the_pad(recipe, 0).unwrap();
+    let computer = started(recipe, &sortie).computer().clone();
+    let (mut frames, mut last) = (Vec::new(), LastFrame::default());
     while sortie.goes_on() || sortie.computer().released_at_s().is_none() {
-        let requests: &[Request] = match sortie.frame() {
-            4_000 => &arm,
-            4_010 => &start,
-            _ => &[],
-        };
-        sortie.step_with(&Outside { requests, ..Outside::NOBODY }, &mut last);
+        let due = crew.iter().filter(|(frame, _)| *frame == sortie.frame());
+        let requests: Vec<_> = due.map(|(_, command)| Request::of_the_programme(*command)).collect();
+        sortie.step_with(&Outside { requests: &requests, ..Outside::NOBODY }, &mut last);
         let mut frame = *last.take().unwrap();
         // A board has no simulated world.
         frame.input.rehearsed = None;
         frames.push(frame);
-        armed |= sortie.computer().mode().interlocks.armed;
         assert!(frames.len() < 40_000);
     }
-    assert!(armed && sortie.outcome().landing.stands, "{:?}", sortie.outcome());
+    (computer, sortie, frames)
+}
+
+/// From power-up: it rehearses by itself, its crew arms and starts it, and it lands. The world is
+/// moved by a computer that decides the same in every frame.
+#[test]
+fn a_board_rehearses_arms_and_lands() {
+    let crew = [(4_000, CrewCommand::Arm), (4_010, CrewCommand::Start)];
+    let (computer, sortie, frames) = flown_from_the_pad(&recipe(), &crew);
+    assert!(sortie.outcome().landing.stands, "{:?}", sortie.outcome());
     let flight = commands_the_same(computer, &frames);
     let rehearsed = flight.computer().rehearsed().unwrap();
     assert!(rehearsed.warm, "{rehearsed:?}");
     assert_eq!(flight.computer().mode().phase, sortie.computer().mode().phase);
 }
 
-/// On a board the heap is for set-up. In flight there are only the lists of a frame's messages,
-/// which end with the frame. vlr needs more intervals in flight than on the ground.
+/// A board that plans between the frames. It expects the commands and the log of a recorded flight.
+struct Expecting<'f> {
+    frames: std::slice::Iter<'f, ComputerFrame>,
+    recorded: Option<&'f ComputerFrame>,
+    planner: Option<Box<Planner>>,
+    messages: usize,
+    /// Most in a frame, and the length of the longest, bytes.
+    most: [usize; 2],
+}
+
+impl port::Board for Expecting<'_> {
+    type Error = core::convert::Infallible;
+
+    fn sense(&mut self) -> Result<Option<LoggedInput>, Self::Error> {
+        self.recorded = self.frames.next();
+        Ok(self.recorded.map(|frame| input_from_log(&frame.input).unwrap()))
+    }
+
+    fn act(&mut self, _: &Commands) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    fn submit(&mut self, planner: Box<Planner>) {
+        self.planner = Some(planner);
+    }
+
+    fn solved(&mut self) -> Option<Box<Planner>> {
+        self.planner.take_if(|_| self.recorded.is_some_and(|frame| frame.input.plan_ready))
+    }
+
+    fn send(&mut self, messages: &[CrewMessage]) {
+        self.messages += messages.len();
+        let lengths = messages.iter().map(|message| match message {
+            CrewMessage::Text { text, .. } => text.len(),
+            CrewMessage::PhaseChanged { .. } => 0,
+        });
+        self.most = [self.most[0].max(messages.len()), lengths.fold(self.most[1], usize::max)];
+    }
+
+    fn log(&mut self, frame: &ComputerFrame) {
+        let recorded = self.recorded.unwrap();
+        assert_eq!(frame.output, recorded.output, "frame {}", recorded.input.frame);
+        assert_eq!(frame.input.rehearsed.is_some(), recorded.input.frame == 1);
+    }
+}
+
+/// A frame is an interrupt of a main context that may hold the heap: it neither allocates nor
+/// frees. From power-up, through a check, refusals, a landing or an abort, to rest.
 #[test]
-fn only_messages_allocate_in_flight() {
-    for mission in ["mk2", "mk3", "vlr"] {
+fn no_frame_uses_the_heap() {
+    const CREW: [(u64, CrewCommand); 8] = [
+        (10, CrewCommand::Start),
+        (500, CrewCommand::Check),
+        (600, CrewCommand::EndCheck),
+        (700, CrewCommand::Arm),
+        (900, CrewCommand::Check),
+        (6_000, CrewCommand::Arm),
+        (6_010, CrewCommand::Start),
+        (8_500, CrewCommand::Abort),
+    ];
+    for (mission, crew) in [("mk2", &CREW[..7]), ("mk3", &CREW[..7]), ("vlr", &CREW[..7]), ("mk3", &CREW)] {
         let recipe = Recipe::built_in(mission, "field").unwrap();
-        let mut sortie = Sortie::new(&recipe, 0).unwrap();
-        let mut computer = started(&recipe, &sortie);
-        let mut frames_with_news = 0;
-        for recorded in &flown(&mut sortie) {
-            let (mut messages, frame) = (0, recorded.input.frame);
-            let read = computer.read(&recorded.input).unwrap();
-            let allocated = allocation_counter::measure(|| messages = computer.step(&read).messages.len());
-            if messages == 0 {
-                assert_eq!(allocated.count_total, 0, "{mission}, frame {frame}: {allocated:?}");
-            } else {
-                frames_with_news += 1;
-                assert!(allocated.bytes_max < MESSAGE_BYTES_MAX, "{mission}, frame {frame}: {allocated:?}");
+        let (computer, sortie, recorded) = flown_from_the_pad(&recipe, crew);
+        let (mut flight, mut frames) = (Frames::new(computer, 0), Vec::new());
+        let mut board =
+            Expecting { frames: recorded.iter(), recorded: None, planner: None, messages: 0, most: [0; 2] };
+        for frame in 1..=recorded.len() {
+            let used = allocation_counter::measure(|| assert!(flight.fly(&mut board).unwrap()));
+            if (used.count_total, used.bytes_current) != (0, 0) {
+                frames.push((frame, flight.computer().mode().phase, used.count_total, used.bytes_current));
             }
-            assert_eq!(allocated.bytes_current, 0, "{mission}, frame {frame}: {allocated:?}");
+            if let Some(planner) = &mut board.planner {
+                planner.solve();
+            }
         }
-        assert!(frames_with_news > 3, "apogee, ignition, touchdown: {mission}, {frames_with_news}");
+        let shown = &frames[..frames.len().min(20)];
+        assert!(frames.is_empty(), "{mission}: {} frames of {}: {shown:?}", frames.len(), recorded.len());
+        assert!(board.messages > 15, "{mission}: {}", board.messages);
+        // Half of the room for each.
+        assert!(board.most[0] <= 8 && board.most[1] <= 128, "{mission}: {:?}", board.most);
+        assert_eq!(sortie.outcome().landing.stands, crew.len() < CREW.len());
     }
 }
 

@@ -158,6 +158,7 @@ pub mod rules {
 }
 
 pub mod computer;
+pub mod text;
 
 #[cfg(any(test, feature = "files"))]
 pub mod vehicles;

@@ -15,6 +15,7 @@ use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::guidance::powered::{ControlLevel, PoweredReport};
 use flight::rules::arming::PredictedLanding;
 use flight::rules::phase::{Mode, Phase};
+use flight::text::text;
 use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::Vector3;
@@ -600,7 +601,7 @@ impl Rehearsal {
         let landing = outcome.touchdown.map(|contact| PredictedLanding::from(&by_envelope(legs, &contact)));
         let rehearsed = Rehearsed {
             warm: outcome.landing.stands && converged > 0,
-            found: format!("{how}, {converged} of {plans} plans converged"),
+            found: text!("{how}, {converged} of {plans} plans converged"),
             landing,
         };
         let report = *flight.pilot().report();

@@ -285,7 +285,7 @@ fn read_pin(pin: &watch::Sender<bool>) {
 
 fn report_event(time_s: f64, event: &VehicleEvent) {
     let words = match event {
-        VehicleEvent::Message(CrewMessage::Text { text, .. }) => text.clone(),
+        VehicleEvent::Message(CrewMessage::Text { text, .. }) => text.to_string(),
         VehicleEvent::Message(CrewMessage::PhaseChanged { from, to }) => {
             format!("phase {} to {}", from.name(), to.name())
         }

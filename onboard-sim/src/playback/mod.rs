@@ -15,6 +15,7 @@ use flight::estimation::sensor_watch::SENSORS;
 use flight::rules::arming::{Check, Uplink};
 use flight::rules::outputs::PyroOutput;
 use flight::rules::phase::Phase;
+use flight::text::Text;
 use flight::vehicle::mission::Mission;
 use flight::vehicle::rigid::RigidState;
 use protocol::log::record::Record;
@@ -58,7 +59,7 @@ pub struct Moment {
 #[derive(Debug, Clone, Default)]
 pub struct Played {
     /// For each arming check its refusals in the last seconds on the pad, the newest first.
-    pub checks: Vec<(&'static str, Vec<String>)>,
+    pub checks: Vec<(&'static str, Vec<Text>)>,
     /// How many seconds these are.
     pub checked_s: usize,
     pub moments: Vec<Moment>,
@@ -154,7 +155,7 @@ impl Player<'_> {
         }
         let Some(flown) = self.computer.flown() else {
             if frame.is_multiple_of(CHECK_FRAMES) {
-                self.checks.push((frame, self.computer.arming_checks()));
+                self.checks.push((frame, self.computer.arming_checks().to_vec()));
             }
             return;
         };

@@ -67,7 +67,7 @@ fn arming_checks_name_what_the_recording_lacks() {
     assert_eq!(played.checked_s, 10);
     let refusals = |name: &str| {
         let (_, refusals) = played.checks.iter().find(|(check, _)| *check == name).unwrap();
-        (refusals.len(), refusals.first().cloned().unwrap_or_default())
+        (refusals.len(), refusals.first().map(ToString::to_string).unwrap_or_default())
     };
     assert_eq!(refusals("GNSS"), (10, "no GNSS fix for 19.0 s".to_owned()));
     assert_eq!(refusals("lidar").0, 10);

@@ -164,7 +164,7 @@ impl Flown {
                     record_at(Record::Event(Event {
                         level: EventLevel::Warning,
                         name: "vehicle".to_owned(),
-                        message: text.clone(),
+                        message: text.to_string(),
                     }));
                 }
                 _ => {}

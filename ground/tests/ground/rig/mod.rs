@@ -52,6 +52,8 @@ pub(crate) struct Rig {
     pub(crate) latch: TdLatch,
     /// Whether the vehicle sends anything at all.
     pub(crate) speaks: bool,
+    /// How many times as long as real time it takes, as an emulated one does.
+    pub(crate) slower: u32,
     /// Whether it reports that it receives this station.
     pub(crate) uplink_alive: bool,
     /// Whether it was this station that armed it.
@@ -83,6 +85,7 @@ impl Rig {
             hold: TdHold::TD_HOLD_NONE,
             latch: TdLatch::TD_LATCH_NONE,
             speaks: true,
+            slower: 1,
             uplink_alive: true,
             armed_here: true,
             uplink_at: Duration::ZERO,
@@ -152,12 +155,16 @@ impl Rig {
     pub(crate) fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds * 10.0).round() as u64 {
             self.now += Duration::from_millis(100);
-            if self.speaks {
-                if self.now.subsec_millis() == 0 {
+            let theirs = self.now / self.slower;
+            if self.speaks
+                && theirs.subsec_millis().is_multiple_of(100)
+                && theirs.subsec_micros() % 1_000 == 0
+            {
+                if theirs.subsec_millis() == 0 {
                     self.heartbeat();
                 }
                 self.flight_status();
-                if self.now.subsec_millis().is_multiple_of(500) {
+                if theirs.subsec_millis().is_multiple_of(500) {
                     self.uplink();
                 }
             }
@@ -166,7 +173,8 @@ impl Rig {
     }
 
     pub(crate) fn boot_ms(&self) -> u32 {
-        u32::try_from(self.now.saturating_sub(self.booted_at).as_millis()).unwrap_or(u32::MAX)
+        let ours = self.now.saturating_sub(self.booted_at);
+        u32::try_from((ours / self.slower).as_millis()).unwrap_or(u32::MAX)
     }
 
     /// The vehicle is switched off and on, with the next boot number.

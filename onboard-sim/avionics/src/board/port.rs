@@ -7,12 +7,17 @@
 //! `heapless::spsc`: nothing is shared.
 
 use alloc::boxed::Box;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::mem::{swap, take};
 
 use crate::log::frame::{LoggedInput, frame_to_log};
+use crate::log::logged::Logged;
+use flight::computer::crew::ANSWERED;
 use flight::computer::messages::CrewMessage;
 use flight::computer::pilot::planner::Planner;
 use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput, flight_time_s};
-use protocol::records::computer_v1::ComputerFrame;
+use protocol::records::computer_v1::{self, ComputerFrame, ComputerInput, ComputerOutput};
 
 /// A board: a crate for one board implements this with its drivers.
 pub trait Board {
@@ -50,13 +55,16 @@ pub trait Board {
     fn log(&mut self, frame: &ComputerFrame);
 }
 
-/// The frames of a flight.
+/// The frames of a flight. None allocates or frees memory.
 #[derive(Debug)]
 pub struct Frames {
     computer: Computer,
     frame: u64,
     /// For the next frame, which stores it.
     rehearsed: Option<Rehearsed>,
+    /// The same in the log, and the last record, whose memory is used again.
+    rehearsal: Option<computer_v1::Rehearsed>,
+    record: ComputerFrame,
 }
 
 impl Frames {
@@ -65,7 +73,12 @@ impl Frames {
     /// rehearses its landing now, which takes some seconds.
     pub fn new(mut computer: Computer, frame: u64) -> Self {
         let rehearsed = computer.rehearse();
-        Self { computer, frame, rehearsed }
+        let input =
+            ComputerInput { requests: Vec::with_capacity(ANSWERED), ..SensedInput::default().to_log() };
+        let (gimbal_rad, fins_rad, answers) = (vec![0.0; 2], vec![0.0; 4], Vec::with_capacity(ANSWERED));
+        let output = ComputerOutput { gimbal_rad, fins_rad, answers, ..ComputerOutput::default() };
+        let record = ComputerFrame { input, output, state_digest: 0 };
+        Self { computer, frame, rehearsal: rehearsed.as_ref().map(Logged::to_log), rehearsed, record }
     }
 
     /// The computer after the last frame.
@@ -93,7 +106,11 @@ impl Frames {
             board.submit(planner);
         }
         board.send(&output.messages);
-        board.log(&frame_to_log(&input, &output, &self.computer, false));
+        self.record = frame_to_log(&input, &output, &self.computer, true, take(&mut self.record));
+        let rehearsal = if rehearsed.is_some() { &mut self.rehearsal } else { &mut None };
+        swap(&mut self.record.input.rehearsed, rehearsal);
+        board.log(&self.record);
+        swap(&mut self.record.input.rehearsed, rehearsal);
         Ok(true)
     }
 }

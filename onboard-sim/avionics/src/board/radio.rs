@@ -136,7 +136,7 @@ impl Crewed {
         stream::RadioInput {
             uplink: self.uplink_state.uplink.to_log(),
             commander: self.uplink_state.commander.to_log(),
-            requests: self.uplink_state.requests.iter().map(Logged::to_log).collect(),
+            requests: self.uplink_state.requests.to_log(),
         }
     }
 }

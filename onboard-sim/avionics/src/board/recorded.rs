@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use crate::log::again::{FrameError, RecordedComputer, mission_flown};
 use crate::log::frame::output_to_log;
 use flight::computer::saved::Saved;
-use protocol::records::computer_v1::ComputerInput;
+use protocol::records::computer_v1::{ComputerInput, ComputerOutput};
 
 pub use crate::link::vehicle::VehicleKind;
 
@@ -150,7 +150,7 @@ impl Flying {
         let speak = |crewed: &mut Crewed| crewed.flown(&read.input(), &output, computer, radio);
         let decided = Answer {
             frame: number,
-            output: output_to_log(&output, computer),
+            output: output_to_log(&output, computer, ComputerOutput::default()),
             state_digest: computer.digest(),
             radio: self.crewed.as_mut().map(speak),
         };

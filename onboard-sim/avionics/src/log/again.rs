@@ -116,7 +116,7 @@ impl RecordedComputer {
     /// The complete frame as a record, after its [step](Self::step).
     pub fn record(&mut self, read: &LoggedInput, output: &Output) -> ComputerFrame {
         let input = read.input();
-        let frame = frame_to_log(&input, output, &self.computer, self.rehearsed);
+        let frame = frame_to_log(&input, output, &self.computer, self.rehearsed, ComputerFrame::default());
         self.rehearsed |= input.rehearsed.is_some();
         frame
     }

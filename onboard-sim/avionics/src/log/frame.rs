@@ -1,8 +1,6 @@
 //! The flight computer's frames as log records, and back, bit for bit.
 
-use alloc::vec::Vec;
-
-use flight::computer::crew::{CrewCommand, Ending, Request};
+use flight::computer::crew::{CrewCommand, Ending, Requests};
 use flight::computer::pilot::Pilot;
 use flight::computer::{Commands, Computer, Input, Output, Rehearsed, SensedInput};
 use flight::estimation::estimator::AidStatus;
@@ -18,7 +16,7 @@ use crate::log::logged::{At, Logged, RecordError};
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoggedInput {
     pub sensed: SensedInput,
-    pub requests: Vec<Request>,
+    pub requests: Requests,
     pub rehearsed: Option<Rehearsed>,
     pub plan_ready: bool,
 }
@@ -48,28 +46,29 @@ pub fn start_to_log(computer: &Computer) -> v1::ComputerStart {
 }
 
 /// A complete frame as a record; `computer` has just flown it. The result of the rehearsal is
-/// recorded in one frame only: with `rehearsed_before` an earlier frame has it.
+/// recorded in one frame only: with `rehearsed_before` an earlier frame has it. The lists of an
+/// `earlier` record are used again.
 pub fn frame_to_log(
     input: &Input<'_>,
     output: &Output,
     computer: &Computer,
     rehearsed_before: bool,
+    earlier: v1::ComputerFrame,
 ) -> v1::ComputerFrame {
-    let mut input = input_to_log(input);
-    if rehearsed_before {
-        input.rehearsed = None;
+    let rehearsed = input.rehearsed.filter(|_| !rehearsed_before);
+    v1::ComputerFrame {
+        input: input_to_log(&Input { rehearsed, ..*input }, earlier.input),
+        output: output_to_log(output, computer, earlier.output),
+        state_digest: computer.digest(),
     }
-    v1::ComputerFrame { input, output: output_to_log(output, computer), state_digest: computer.digest() }
 }
 
-fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
+fn input_to_log(input: &Input<'_>, mut record: v1::ComputerInput) -> v1::ComputerInput {
     let &Input { ref sensed, requests, rehearsed, plan_ready } = input;
-    v1::ComputerInput {
-        requests: requests.iter().map(Logged::to_log).collect(),
-        rehearsed: rehearsed.map(Logged::to_log),
-        plan_ready,
-        ..sensed.to_log()
-    }
+    sensed.log_over(&mut record);
+    record.requests.clear();
+    record.requests.extend(requests.iter().map(Logged::to_log));
+    v1::ComputerInput { rehearsed: rehearsed.map(Logged::to_log), plan_ready, ..record }
 }
 
 /// A recorded input.
@@ -78,10 +77,9 @@ fn input_to_log(input: &Input<'_>) -> v1::ComputerInput {
 /// It has a value that is unknown to this build.
 pub fn input_from_log(input: &v1::ComputerInput) -> Result<LoggedInput, RecordError> {
     let at = At { frame: input.frame, field: "input" };
-    let requests = input.requests.iter().map(|request| Logged::from_log(request, at));
     Ok(LoggedInput {
         sensed: Logged::from_log(input, at)?,
-        requests: requests.collect::<Result<_, _>>()?,
+        requests: Logged::from_log(&input.requests, at)?,
         rehearsed: Logged::from_log(&input.rehearsed, at)?,
         plan_ready: input.plan_ready,
     })
@@ -94,13 +92,20 @@ pub fn accepts_abort(frame: &v1::ComputerFrame) -> bool {
     answered.any(|(request, answer)| request.asked == abort && *answer == accepted)
 }
 
-/// A frame's output as a record; `computer` has just flown it.
-pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput {
+/// A frame's output as a record; `computer` has just flown it. The lists of an `earlier` record are
+/// used again.
+pub fn output_to_log(
+    output: &Output,
+    computer: &Computer,
+    mut earlier: v1::ComputerOutput,
+) -> v1::ComputerOutput {
     let Output { commands, released, answers, messages: _, planned } = output;
     let &Commands { gimbal_rad, fins_rad, outputs } = commands;
+    gimbal_rad.log_over(&mut earlier.gimbal_rad);
+    fins_rad.log_over(&mut earlier.fins_rad);
+    earlier.answers.clear();
+    earlier.answers.extend(answers.iter().map(|answer| answer.ending.to_log()));
     v1::ComputerOutput {
-        gimbal_rad: gimbal_rad.to_vec(),
-        fins_rad: fins_rad.to_vec(),
         ignite: outputs.is_on(PyroOutput::LandingIgniter),
         parachute: outputs.is_on(PyroOutput::Parachute),
         released: *released,
@@ -108,9 +113,9 @@ pub fn output_to_log(output: &Output, computer: &Computer) -> v1::ComputerOutput
         phase: u32::from(computer.mode().phase.index()),
         level: u32::from(computer.level().index()),
         over: computer.is_over(),
-        answers: answers.iter().map(|answer| answer.ending.to_log()).collect(),
         ignite_booster: outputs.is_on(PyroOutput::AscentIgniter),
         separate_booster: outputs.is_on(PyroOutput::Separation),
+        ..earlier
     }
 }
 
@@ -185,12 +190,13 @@ fn motor_to_log(pilot: &Pilot) -> Option<flight_v1::MotorEstimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flight::computer::crew::{CrewCommand, People};
+    use flight::computer::crew::{CrewCommand, People, Request};
     use flight::computer::{Commander, LogState};
     use flight::estimation::estimator::{ImuSample, Measurements};
     use flight::rules::arming::{PredictedLanding, Uplink};
     use flight::rules::operator::{Name, Operator, Role};
     use flight::rules::two_person::Station;
+    use flight::text::text;
     use nalgebra::Vector3;
     use proptest::prelude::*;
     use prost::Message as _;
@@ -288,8 +294,8 @@ mod tests {
             };
             let rehearsed = rehearsed.map(|(warm, found, landing)| Rehearsed {
                 warm,
-                found,
-                landing: landing.map(|(lands, found)| PredictedLanding { lands, found }),
+                found: text!("{found}"),
+                landing: landing.map(|(lands, found)| PredictedLanding { lands, found: text!("{found}") }),
             });
             let sensed = SensedInput {
                 frame,
@@ -315,10 +321,10 @@ mod tests {
             };
             let input =
                 Input { sensed, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
-            let bytes = input_to_log(&input).encode_to_vec();
+            let bytes = input_to_log(&input, Default::default()).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
             // Compared as bytes as well, because a NaN never equals itself.
-            prop_assert_eq!(input_to_log(&read.input()).encode_to_vec(), bytes);
+            prop_assert_eq!(input_to_log(&read.input(), Default::default()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
             let fields = |requests: &[Request]| {

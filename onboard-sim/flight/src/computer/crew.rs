@@ -1,7 +1,6 @@
 //! Crew requests by radio: the decision on each, and its answer.
 
-use alloc::format;
-use alloc::string::{String, ToString as _};
+use arrayvec::ArrayVec;
 use serde::Serialize;
 
 use super::messages::Severity;
@@ -16,6 +15,7 @@ use crate::rules::phase::{
 use crate::rules::two_person::{
     Act, CONFIRM_WITHIN_S, NoAgreement, Proposal, Reply, Station, TAP_WITHIN_S, TwoPerson,
 };
+use crate::text::{Text, text};
 
 numbered_enum! {
 /// A crew command, by its number in the log. Its name is used in messages such as `abort refused`.
@@ -98,8 +98,15 @@ pub enum Ending {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
     pub ending: Ending,
-    pub reason: Option<String>,
+    pub reason: Option<Text>,
 }
+
+/// Requests that a frame answers. More are decided, and not answered.
+pub const ANSWERED: usize = 16;
+/// Requests of a frame, in order.
+pub type Requests = ArrayVec<Request, ANSWERED>;
+/// The answers to them.
+pub type Answers = ArrayVec<Answer, ANSWERED>;
 
 impl Answer {
     pub(super) const ACCEPTED: Self = Self { ending: Ending::Accepted, reason: None };
@@ -151,15 +158,15 @@ fn refused(table: &mut PhaseTable, command: CrewCommand, refusal: Refusal, check
         return Answer::ACCEPTED;
     }
     let reason = match refusal {
-        Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| refusal.to_string()),
-        other => other.to_string(),
+        Refusal::ChecksFailed => arming::first_refusal(checks).unwrap_or_else(|| text!("{refusal}")),
+        other => text!("{other}"),
     };
     let ending = match (command, refusal) {
         (CrewCommand::Abort, _) => Ending::Failed,
         (_, Refusal::ChecksFailed | Refusal::PinIn) => Ending::NotNow,
         _ => Ending::Denied,
     };
-    table.report(Severity::Warning, format!("{} refused: {reason}", command.name()));
+    table.report(Severity::Warning, text!("{} refused: {reason}", command.name()));
     Answer { ending, reason: Some(reason) }
 }
 
@@ -202,7 +209,7 @@ impl Computer {
             && self.end_check(command.name());
         if check_ended && matches!(command, CrewCommand::Arm | CrewCommand::Start) {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
-            return Answer { ending: Ending::NotNow, ..self.deny(command, reason.into()) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, text!("{reason}")) };
         }
         if let Some(reason) = self.why_not_here(request) {
             return self.deny(command, reason);
@@ -215,15 +222,15 @@ impl Computer {
         }
         if command == CrewCommand::Abort && !mode.interlocks.abort_latched {
             let who = match (by, station) {
-                (Some(by), _) => Some(format!("{by}")),
+                (Some(by), _) => Some(text!("{by}")),
                 (None, Some(station)) if self.input.people.is_some() => {
-                    Some(format!("station {station}, with the key that all share,"))
+                    Some(text!("station {station}, with the key that all share,"))
                 }
-                (None, Some(station)) => Some(format!("station {station}")),
+                (None, Some(station)) => Some(text!("station {station}")),
                 (None, None) => None,
             };
             if let Some(who) = who {
-                self.table.report(Severity::Warning, format!("{who} aborts"));
+                self.table.report(Severity::Warning, text!("{who} aborts"));
             }
         }
         let checks = self.arming_checks_by(uplink);
@@ -241,8 +248,8 @@ impl Computer {
         };
         let may_hold = mode.may_hold_for(HoldCause::Commanded, start, time_s);
         if let (CrewCommand::Hold, true, Some(station)) = (command, may_hold, station) {
-            let who = by.map_or_else(String::new, |by| format!("{by}, "));
-            self.table.report(Severity::Notice, format!("{who}station {station} requests a hold"));
+            let who = by.map_or_else(Text::new, |by| text!("{by}, "));
+            self.table.report(Severity::Notice, text!("{who}station {station} requests a hold"));
         }
         // A request that the phase table would refuse needs no second person's confirmation.
         let refusal = transition(&mode, event, time_s).refusal;
@@ -260,20 +267,20 @@ impl Computer {
     }
 
     /// Why this sender may not give this command; `None` if it may.
-    fn why_not_of(&self, request: &Request) -> Option<String> {
+    fn why_not_of(&self, request: &Request) -> Option<Text> {
         let people = self.input.people?;
         let Request { command, station, by, .. } = *request;
         if station.is_none() {
             let shared = act_of(command).is_some() && people != People::One;
-            return shared.then(|| "two people arm and start, not the vehicle by itself".into());
+            return shared.then(|| text!("two people arm and start, not the vehicle by itself"));
         }
         // Any holder of a key may stop the launch; the links drop all others.
         if matches!(command, CrewCommand::Abort | CrewCommand::Hold) {
             return None;
         }
         match by {
-            None => Some("only an operator with a key of their own commands".into()),
-            Some(by) if !by.role.may_command() => Some(format!("{by} only looks on")),
+            None => Some(text!("only an operator with a key of their own commands")),
+            Some(by) if !by.role.may_command() => Some(text!("{by} only looks on")),
             Some(_) => None,
         }
     }
@@ -281,19 +288,19 @@ impl Computer {
     /// Why this station may not arm or start now; `None` if it may. With one person, the station
     /// that armed must start, because its silence holds the countdown. With two, one gives dead-man
     /// confirmations, and they may start from any two stations.
-    fn why_not_here(&self, request: &Request) -> Option<String> {
+    fn why_not_here(&self, request: &Request) -> Option<Text> {
         let station = request.station?;
         match request.command {
             CrewCommand::Arm => {
                 let (disarmed_s, by) = self.crew.disarmed?;
                 (by != station && self.table.time_s - disarmed_s < DISARMED_S)
-                    .then(|| format!("{by} has just disarmed it: agree, then arm again"))
+                    .then(|| text!("{by} has just disarmed it: agree, then arm again"))
             }
             CrewCommand::Start if !matches!(self.input.people, Some(People::Two { .. })) => {
                 let armed_by = self.input.commander.filter(|_| self.table.mode().interlocks.armed)?;
                 (armed_by.station != station).then(|| {
                     let who = named(armed_by.station, armed_by.by);
-                    format!("{who} armed it: start there, or take command when it is silent")
+                    text!("{who} armed it: start there, or take command when it is silent")
                 })
             }
             _ => None,
@@ -309,7 +316,7 @@ impl Computer {
             (None | Some(People::One), _) | (Some(People::Two { .. }), None) => return Ok(None),
         };
         let (Some(by), Some(station)) = (by, station) else {
-            let reason = "two people with a key each, at a station, must agree".into();
+            let reason = text!("two people with a key each, at a station, must agree");
             return Err(self.deny(command, reason));
         };
         let time_s = self.table.time_s;
@@ -319,7 +326,7 @@ impl Computer {
             Reply::Proposed(proposal) => {
                 let reason = proposal_text(&proposal, time_s);
                 if waited != Some(proposal) {
-                    self.table.report(Severity::Notice, reason.clone());
+                    self.table.report(Severity::Notice, reason);
                 }
                 Err(Answer { ending: Ending::ToConfirm, reason: Some(reason) })
             }
@@ -353,13 +360,13 @@ impl Computer {
             _ => {}
         }
         if let Some((Proposal { act, by, .. }, confirmed_by)) = agreed {
-            let words = format!("{}: requested by {by}, confirmed by {confirmed_by}", act.name());
+            let words = text!("{}: requested by {by}, confirmed by {confirmed_by}", act.name());
             self.table.report(Severity::Notice, words);
         }
     }
 
-    pub(super) fn deny(&mut self, command: CrewCommand, reason: String) -> Answer {
-        self.table.report(Severity::Warning, format!("{} refused: {reason}", command.name()));
+    pub(super) fn deny(&mut self, command: CrewCommand, reason: Text) -> Answer {
+        self.table.report(Severity::Warning, text!("{} refused: {reason}", command.name()));
         Answer { ending: Ending::Denied, reason: Some(reason) }
     }
 
@@ -369,8 +376,8 @@ impl Computer {
             return Answer::ACCEPTED;
         }
         let reason = match self.crew.two_person.tapping {
-            Some(tapping) => format!("{} taps", tapping.by),
-            None => "no countdown that two people have started".into(),
+            Some(tapping) => text!("{} taps", tapping.by),
+            None => text!("no countdown that two people have started"),
         };
         self.deny(CrewCommand::Tap, reason)
     }
@@ -378,26 +385,26 @@ impl Computer {
     /// A station takes command from a silent one.
     fn take_command(&mut self, request: &Request) -> Answer {
         let Some(station) = request.station else {
-            return self.deny(CrewCommand::TakeCommand, "no station".into());
+            return self.deny(CrewCommand::TakeCommand, text!("no station"));
         };
         let armed = self.table.mode().interlocks.armed;
         let Some(Commander { station: before, age_s, by: before_by, .. }) =
             self.input.commander.filter(|_| armed)
         else {
-            return self.deny(CrewCommand::TakeCommand, "no station has armed the vehicle".into());
+            return self.deny(CrewCommand::TakeCommand, text!("no station has armed the vehicle"));
         };
         if before == station {
             return Answer::ACCEPTED;
         }
         let (old, new) = (named(before, before_by), named(station, request.by));
         if age_s <= UPLINK_PROVEN_S {
-            return self.deny(CrewCommand::TakeCommand, format!("{old} was received {age_s:.1} s ago"));
+            return self.deny(CrewCommand::TakeCommand, text!("{old} was received {age_s:.1} s ago"));
         }
         // One person cannot both command and give the dead-man confirmations.
         if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping, request.by)
             && tapping.by.number == by.number
         {
-            return self.deny(CrewCommand::TakeCommand, format!("{by} taps: hold the countdown first"));
+            return self.deny(CrewCommand::TakeCommand, text!("{by} taps: hold the countdown first"));
         }
         // A role hands over to the same role; range safety may always take over.
         if let (Some(before_by), Some(by)) = (before_by, request.by)
@@ -405,12 +412,12 @@ impl Computer {
             && by.role != crate::rules::operator::Role::RangeSafety
         {
             let wanted = before_by.role.name();
-            let reason = format!("only {wanted} or RANGE SAFETY takes over from {old}");
+            let reason = text!("only {wanted} or RANGE SAFETY takes over from {old}");
             return self.deny(CrewCommand::TakeCommand, reason);
         }
         let silence =
-            if age_s.is_finite() { format!("silent for {age_s:.0} s") } else { "never received".into() };
-        self.table.report(Severity::Critical, format!("{new} takes command from {old}, {silence}"));
+            if age_s.is_finite() { text!("silent for {age_s:.0} s") } else { text!("never received") };
+        self.table.report(Severity::Critical, text!("{new} takes command from {old}, {silence}"));
         Answer::ACCEPTED
     }
 
@@ -421,10 +428,9 @@ impl Computer {
         // NaN is no sign of life.
         let is_heard = age_s <= UPLINK_SILENT_S;
         let held = if is_heard {
-            deaf && self
-                .hold(HoldCause::StationDeaf, || format!("{station} receives nothing of this vehicle"))
+            deaf && self.hold(HoldCause::StationDeaf, || text!("{station} receives nothing of this vehicle"))
         } else {
-            let why = || format!("nothing received from {station} for {UPLINK_SILENT_S} s");
+            let why = || text!("nothing received from {station} for {UPLINK_SILENT_S} s");
             self.hold(HoldCause::UplinkSilent, why)
         };
         if held {
@@ -436,7 +442,7 @@ impl Computer {
         // NaN is no sign of life.
         let is_attended = age_s <= ALONE_S;
         if waits && !is_attended {
-            let words = format!("nothing received from {station} for {ALONE_S} s: DISARMED");
+            let words = text!("nothing received from {station} for {ALONE_S} s: DISARMED");
             self.table.report(Severity::Critical, words);
             let _ = self.table.apply(Event::DisarmRequested { lifted_off: false });
         }
@@ -444,7 +450,7 @@ impl Computer {
 
     /// Holds a running countdown and reports the reason, unless this cause comes too late to hold
     /// it.
-    pub(super) fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> String) -> bool {
+    pub(super) fn hold(&mut self, cause: HoldCause, why: impl FnOnce() -> Text) -> bool {
         let start = self.start_point();
         if !self.table.mode().may_hold_for(cause, start, self.table.time_s) {
             return false;
@@ -462,7 +468,7 @@ impl Computer {
             return;
         }
         let Some(by) = self.crew.two_person.lapsed(self.table.time_s) else { return };
-        if self.hold(HoldCause::TapOverdue, || format!("no tap of {by} for {TAP_WITHIN_S} s")) {
+        if self.hold(HoldCause::TapOverdue, || text!("no tap of {by} for {TAP_WITHIN_S} s")) {
             self.crew.held_by = Some(by);
             self.crew.two_person.end_taps();
         }
@@ -470,8 +476,8 @@ impl Computer {
 }
 
 /// Formats a station with its operator, if any, and its ids.
-fn named(station: Station, by: Option<Operator>) -> String {
-    by.map_or_else(|| format!("{station}"), |by| format!("{by} ({station})"))
+fn named(station: Station, by: Option<Operator>) -> Text {
+    by.map_or_else(|| text!("{station}"), |by| text!("{by} ({station})"))
 }
 
 /// The act that needs two people; `None` if one is enough.
@@ -483,30 +489,26 @@ fn act_of(command: CrewCommand) -> Option<Act> {
     }
 }
 
-fn proposal_text(proposal: &Proposal, time_s: f64) -> String {
+fn proposal_text(proposal: &Proposal, time_s: f64) -> Text {
     let mut others = proposal.by.role.others();
     let [one, other] = [others.next(), others.next()].map(|role| role.map_or("", |role| role.name()));
     let left_s = proposal.left_s(time_s).clamp(0.0, CONFIRM_WITHIN_S);
     let Proposal { act, by, .. } = proposal;
-    format!("{by} requests to {}: {one} or {other} must confirm within {left_s:.0} s", act.name())
+    text!("{by} requests to {}: {one} or {other} must confirm within {left_s:.0} s", act.name())
 }
 
-fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> String {
+fn why_no_agreement(refusal: NoAgreement, act: Act, time_s: f64) -> Text {
     match refusal {
-        NoAgreement::Observer => "observers command nothing".to_string(),
+        NoAgreement::Observer => text!("observers command nothing"),
         NoAgreement::Pending(proposal) => proposal_text(&proposal, time_s),
         NoAgreement::NothingToConfirm => {
-            format!("no pending proposal to {} has that number", act.name())
+            text!("no pending proposal to {} has that number", act.name())
         }
         NoAgreement::SamePerson(proposal) => {
-            format!("{} requested it: another role must confirm", proposal.by)
+            text!("{} requested it: another role must confirm", proposal.by)
         }
         NoAgreement::SameRole(proposal) => {
-            format!(
-                "{} requested it: another role than {} must confirm",
-                proposal.by,
-                proposal.by.role.name()
-            )
+            text!("{} requested it: another role than {} must confirm", proposal.by, proposal.by.role.name())
         }
     }
 }

@@ -1,14 +1,12 @@
 //! Messages of the flight computer: phase changes, and texts to the crew.
 
-use alloc::borrow::ToOwned as _;
-use alloc::format;
-use alloc::string::String;
 use serde::Serialize;
 
 use crate::rules::arming::{Check, UPLINK_CHECK};
 use crate::rules::phase::{
     Effect, HOLD_LIMIT_S, Interlocks, MISFIRE_WAIT_S, MOTOR_HOT_S, Mode, MotorStatus, Phase,
 };
+use crate::text::{Text, text};
 
 /// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,7 +29,7 @@ pub enum CrewMessage {
     /// Text for the crew.
     Text {
         severity: Severity,
-        text: String,
+        text: Text,
     },
     PhaseChanged {
         from: Phase,
@@ -40,7 +38,7 @@ pub enum CrewMessage {
 }
 
 /// The message for an effect; `None` if the phase change already reports it.
-pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, String)> {
+pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, Text)> {
     use Effect as E;
     let severity = match effect {
         E::FinsOpen => return None,
@@ -52,9 +50,9 @@ pub(super) fn words_of(effect: Effect, countdown_s: f64) -> Option<(Severity, St
     Some((
         severity,
         match effect {
-            E::StartCountdown => format!("{words}: release in {countdown_s} s"),
-            E::HoldCountdown => format!("{words}; start again or it disarms in {HOLD_LIMIT_S} s"),
-            _ => words.to_owned(),
+            E::StartCountdown => text!("{words}: release in {countdown_s} s"),
+            E::HoldCountdown => text!("{words}; start again or it disarms in {HOLD_LIMIT_S} s"),
+            _ => text!("{words}"),
         },
     ))
 }
@@ -88,7 +86,7 @@ impl Readiness {
     /// Returns why the vehicle may not be armed or started, and whether this is still to be
     /// reported: the first check that has failed for [`FAILS_FOR_S`]. The uplink check is left out.
     /// It changes with every lost heartbeat, and each station gets a report of its uplink anyway.
-    pub(super) fn failing(&mut self, checks: &[Check], time_s: f64) -> Option<(String, bool)> {
+    pub(super) fn failing(&mut self, checks: &[Check], time_s: f64) -> Option<(Text, bool)> {
         let Some(check) = checks.iter().find(|check| !check.passed && check.name != UPLINK_CHECK) else {
             *self = Self::default();
             return None;
@@ -123,7 +121,7 @@ impl Default for MotorWatch {
 
 impl MotorWatch {
     /// Returns a message if the state has changed.
-    pub(super) fn update(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, String)> {
+    pub(super) fn update(&mut self, mode: &Mode, time_s: f64) -> Option<(Severity, Text)> {
         use MotorStatus as M;
         let now = Self {
             status: mode.motor_status(time_s),
@@ -136,7 +134,7 @@ impl MotorWatch {
         }
         let (severity, words) = match now {
             Self { status: M::Live, landed: true, free: false } => {
-                let words = format!("LIVE MOTOR: do not approach for {MISFIRE_WAIT_S} s, then pin first");
+                let words = text!("LIVE MOTOR: do not approach for {MISFIRE_WAIT_S} s, then pin first");
                 return Some((Severity::Critical, words));
             }
             Self { status: M::Live, landed: true, free: true } => {
@@ -145,7 +143,7 @@ impl MotorWatch {
             // Every other state is reported once, when the status changes.
             _ if now.status == before.status => return None,
             Self { status: M::Hot, .. } => {
-                return Some((Severity::Notice, format!("burn-out: motor hot for {MOTOR_HOT_S} s")));
+                return Some((Severity::Notice, text!("burn-out: motor hot for {MOTOR_HOT_S} s")));
             }
             Self { status: M::Live, landed: false, .. } if mode.phase.on_pad() => {
                 (Severity::Info, "pin out: landing motor live")
@@ -158,7 +156,7 @@ impl MotorWatch {
             // Reported at the ignition command.
             Self { status: M::Burning, .. } => return None,
         };
-        Some((severity, words.to_owned()))
+        Some((severity, text!("{words}")))
     }
 }
 
@@ -190,16 +188,16 @@ mod tests {
     fn each_change_of_the_motor_in_a_flight_is_reported_once() {
         let mut watch = MotorWatch::default();
         let mut message = |phase, motor, time_s| {
-            watch.update(&mode(phase, motor, true), time_s).map_or_else(String::new, |(_, words)| words)
+            watch.update(&mode(phase, motor, true), time_s).map_or_else(Text::new, |(_, words)| words)
         };
-        assert_eq!(message(Phase::PadIdle, Motor::Unlit, 1.0), "pin out: landing motor live");
-        assert_eq!(message(Phase::PadArmed, Motor::Unlit, 2.0), "");
-        assert_eq!(message(Phase::LandArmed, Motor::Unlit, 3.0), "");
-        assert_eq!(message(Phase::Powered, Motor::Burning, 4.0), "");
+        assert_eq!(message(Phase::PadIdle, Motor::Unlit, 1.0).as_str(), "pin out: landing motor live");
+        assert_eq!(message(Phase::PadArmed, Motor::Unlit, 2.0).as_str(), "");
+        assert_eq!(message(Phase::LandArmed, Motor::Unlit, 3.0).as_str(), "");
+        assert_eq!(message(Phase::Powered, Motor::Burning, 4.0).as_str(), "");
         let burnt_out = Motor::BurntOut { at_s: 9.0 };
-        assert_eq!(message(Phase::Powered, burnt_out, 9.0), "burn-out: motor hot for 60 s");
-        assert_eq!(message(Phase::Touchdown, burnt_out, 10.0), "");
-        assert_eq!(message(Phase::Touchdown, burnt_out, 69.0), "landing motor burnt out and cooled");
-        assert_eq!(message(Phase::Safed, burnt_out, 69.1), "");
+        assert_eq!(message(Phase::Powered, burnt_out, 9.0).as_str(), "burn-out: motor hot for 60 s");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 10.0).as_str(), "");
+        assert_eq!(message(Phase::Touchdown, burnt_out, 69.0).as_str(), "landing motor burnt out and cooled");
+        assert_eq!(message(Phase::Safed, burnt_out, 69.1).as_str(), "");
     }
 }

@@ -25,23 +25,19 @@ pub mod pilot;
 pub mod saved;
 pub mod table;
 
-use alloc::borrow::ToOwned as _;
 use alloc::boxed::Box;
-use alloc::format;
-use alloc::string::String;
-use alloc::vec::Vec;
 use core::ops::Deref;
 
 use serde::{Deserialize, Serialize};
 
 pub use self::crew::CrewMemory;
-use self::crew::{Answer, People, Request};
-use self::messages::{CrewMessage, MotorWatch, Readiness, Severity};
+use self::crew::{Answers, People, Request};
+use self::messages::{MotorWatch, Readiness, Severity};
 use self::pad::{ANSWERING_RAD, PadWatch, SelfTest};
 use self::pad_check::{PadCheck, SURFACES, surfaces_rad};
 use self::pilot::{Pilot, Pointed};
 pub use self::table::AbortEffect;
-use self::table::PhaseTable;
+use self::table::{Messages, PhaseTable};
 use crate::control::servo::ServoModel;
 use crate::estimation::estimator::Measurements;
 use crate::estimation::sensor_watch::SensorWatch;
@@ -53,6 +49,7 @@ use crate::rules::operator::Operator;
 use crate::rules::outputs::{FlightProgress, Outputs};
 use crate::rules::phase::{Event, HOLD_LIMIT_S, Latch, Mode, Motor, Phase, StartPoint};
 use crate::rules::two_person::Station;
+use crate::text::{Text, text};
 use crate::vehicle::mission::{ArmingLimits, Mission};
 use crate::vehicle::rigid::RigidState;
 
@@ -149,7 +146,11 @@ impl Computer {
             self.pilot.estimate_state((phase, is_over), flown, &self.sensors);
             self.pilot.predict(&mut self.table, flown);
         }
-        let answers = input.requests.iter().map(|request| self.answer(request)).collect();
+        let mut answers = Answers::new();
+        for request in input.requests {
+            let answer = self.answer(request);
+            let _ = answers.try_push(answer);
+        }
         self.check_the_commander(input);
         self.check_dead_man_timeout();
         if let Some(flown) = &flown {
@@ -202,7 +203,7 @@ impl Computer {
         let on_ground = self.start_point() != StartPoint::Drone;
         if waits && on_ground && !interlocks.abort_latched && self.pad.moves() {
             let words = "switched on while it moves: it cannot be armed, DO NOT APPROACH";
-            self.table.report(Severity::Critical, words.into());
+            self.table.report(Severity::Critical, words);
             let abort = self.abort_event();
             let _ = self.table.apply(abort);
         }
@@ -228,7 +229,7 @@ impl Computer {
         }
         if self.input.log.running && !input.log.running {
             let words = "the log has stopped: this flight is no longer recorded whole";
-            self.table.report(Severity::Error, words.into());
+            self.table.report(Severity::Error, words);
         }
     }
 
@@ -239,7 +240,7 @@ impl Computer {
         let phase = self.table.mode().phase;
         let refusal = self.pilot.gate_refusal().filter(|_| phase == Phase::LandArmed);
         if let Some(check) = refusal.filter(|_| refusal != self.reported_gate_check) {
-            self.table.report(Severity::Critical, format!("ignition gate closed: {check}"));
+            self.table.report(Severity::Critical, text!("ignition gate closed: {check}"));
         }
         self.reported_gate_check = refusal;
         self.commands = Commands { gimbal_rad, fins_rad, ..self.commands };
@@ -247,7 +248,7 @@ impl Computer {
         // one.
         let misses = |level| matches!(level, ControlLevel::ShiftedPlan | ControlLevel::Stabiliser);
         if phase.in_landing_burn() && level != self.level && (misses(level) || misses(self.level)) {
-            self.table.report(Severity::Notice, format!("controller level {}", level.name()));
+            self.table.report(Severity::Notice, text!("controller level {}", level.name()));
         }
         self.level = level;
     }
@@ -256,7 +257,7 @@ impl Computer {
     fn apply_timeouts(&mut self) {
         let (mode, time_s) = (*self.table.mode(), self.table.time_s);
         if mode.held(time_s).is_some_and(|(_, left_s)| left_s <= 0.0) {
-            let words = format!("held for {HOLD_LIMIT_S} s without a new start");
+            let words = text!("held for {HOLD_LIMIT_S} s without a new start");
             self.table.report(Severity::Warning, words);
             let _ = self.table.apply(Event::HoldElapsed);
         }
@@ -385,7 +386,7 @@ pub struct Rehearsed {
     /// The planner found plans, and the vehicle landed on its legs.
     pub warm: bool,
     /// The result as text.
-    pub found: String,
+    pub found: Text,
     /// The rehearsed touchdown; `None` if the vehicle did not reach the ground.
     pub landing: Option<PredictedLanding>,
 }
@@ -396,7 +397,7 @@ impl Rehearsed {
     #[must_use]
     pub fn explained(self, mission: &Mission) -> Self {
         let misfit = if self.warm { None } else { EvenLanding::of(mission).misfit() };
-        Self { found: misfit.map_or(self.found, str::to_owned), ..self }
+        Self { found: misfit.map_or(self.found, |words| text!("{words}")), ..self }
     }
 }
 
@@ -492,9 +493,9 @@ pub struct Output {
     /// its flight.
     pub released: bool,
     /// An answer to each request, in order.
-    pub answers: Vec<Answer>,
+    pub answers: Answers,
     /// Messages, in order.
-    pub messages: Vec<CrewMessage>,
+    pub messages: Messages,
     /// A plan of a landing was taken over.
     pub planned: bool,
 }

@@ -2,8 +2,6 @@
 //! drone, and its attitude. Also the self-test, the arming checks, and the sequence from power-up
 //! to the release.
 
-use alloc::format;
-use alloc::vec::Vec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -13,8 +11,9 @@ use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadRecord, PadStart};
 use crate::estimation::sensor_watch::Rests;
 use crate::estimation::spikes::SpikeFilter;
-use crate::rules::arming::{ArmingInput, Check, Uplink, arming_checks};
+use crate::rules::arming::{ArmingInput, Checks, Uplink, arming_checks};
 use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
+use crate::text::text;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::rigid::{RigidState, upright};
 
@@ -258,16 +257,16 @@ impl Computer {
     }
 
     /// The arming checks with the present values and the best uplink.
-    pub fn arming_checks(&self) -> Vec<Check> {
+    pub fn arming_checks(&self) -> Checks {
         self.arming_checks_by(self.input.uplink)
     }
 
-    pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Vec<Check> {
+    pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Checks {
         let locks = &self.table.mode().interlocks;
         let stance = self.stance();
         let (controller_warm, controller_found, predicted_landing) = match &self.rehearsed {
-            Some(rehearsed) => (rehearsed.warm, rehearsed.found.clone(), rehearsed.landing.clone()),
-            None => (false, "no rehearsal yet".into(), None),
+            Some(rehearsed) => (rehearsed.warm, rehearsed.found, rehearsed.landing.clone()),
+            None => (false, text!("no rehearsal yet"), None),
         };
         let input = ArmingInput {
             pin_out: locks.pin_out,
@@ -306,11 +305,11 @@ impl Computer {
             _ => return,
         };
         let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s) else { return };
-        let held = armed && self.hold(HoldCause::CheckFailed, || why.clone());
+        let held = armed && self.hold(HoldCause::CheckFailed, || why);
         if untold && !held {
             let (severity, state) =
                 if armed { (Severity::Critical, "armed, and ") } else { (Severity::Warning, "not ready: ") };
-            self.table.report(severity, format!("{state}{why}"));
+            self.table.report(severity, text!("{state}{why}"));
         }
     }
 }
@@ -336,7 +335,7 @@ impl Computer {
     /// A motor may ignite without a command.
     fn wait_on_the_rail(&mut self, input: &SensedInput) {
         if self.pilot.detects_lift_off(&input.measured) {
-            self.table.report(Severity::Critical, "LIFT-OFF without a countdown".into());
+            self.table.report(Severity::Critical, "LIFT-OFF without a countdown");
             if self.table.apply(Event::LiftOff).is_ok() {
                 self.begin_flight();
             }
@@ -350,7 +349,7 @@ impl Computer {
         let released = if self.countdown_is_over() {
             self.table.apply(Event::ReleasedAt(StartPoint::Drone))
         } else {
-            self.table.report(Severity::Critical, "RELEASED before it was cleared".into());
+            self.table.report(Severity::Critical, "RELEASED before it was cleared");
             let parachute_fills = self.parachute_fills_below_the_drone();
             self.table.apply(Event::ReleasedEarly { parachute_fills })
         };
@@ -388,7 +387,7 @@ impl Computer {
             }
             TestStep::Failed => {
                 let fins = self.fins_answering.iter().filter(|answers| **answers).count();
-                let words = format!("self-test failed: an actuator does not answer ({fins} of 4 fins do)");
+                let words = text!("self-test failed: an actuator does not answer ({fins} of 4 fins do)");
                 self.table.report(Severity::Error, words);
             }
             TestStep::Passed | TestStep::Wait => {}

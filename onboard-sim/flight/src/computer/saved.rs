@@ -141,7 +141,7 @@ impl Computer {
             Some(flown) => {
                 self.table.go_on(saved.mode, saved.latch);
                 let words = "the flight computer has restarted IN FLIGHT";
-                self.table.report(Severity::Critical, words.into());
+                self.table.report(Severity::Critical, words);
                 // This state was already reported.
                 let _ = self.motor_watch.update(&saved.mode, saved.time_s);
                 self.release = Some(flown.release);
@@ -169,7 +169,7 @@ impl Computer {
         } else {
             (Severity::Notice, "the flight computer has restarted")
         };
-        self.table.report(severity, words.into());
+        self.table.report(severity, words);
     }
 
     /// Restarts the computer with the state saved in the last frame.

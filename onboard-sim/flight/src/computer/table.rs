@@ -1,15 +1,19 @@
 //! The phase table in the flight computer: every event is applied here, once. Also predicts the
 //! effect of an abort.
 
-use alloc::borrow::ToOwned as _;
-use alloc::string::String;
-use alloc::vec::Vec;
+use core::fmt::Display;
+
+use arrayvec::ArrayVec;
 use serde::Serialize;
 
 use super::Computer;
 use super::messages::{CrewMessage, Severity, words_of, words_of_landing_here};
 use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
+use crate::text::text;
+
+/// Messages of a frame, in order; three is the most in a nominal flight.
+pub type Messages = ArrayVec<CrewMessage, 16>;
 
 /// Phase, latches, and the messages of this frame.
 #[derive(Debug, Clone, Serialize)]
@@ -23,13 +27,13 @@ pub struct PhaseTable {
     #[serde(skip)]
     pub(super) time_s: f64,
     #[serde(skip)]
-    messages: Vec<CrewMessage>,
+    messages: Messages,
 }
 
 impl PhaseTable {
     /// The table at power-up.
     pub(super) fn new(time_s: f64) -> Self {
-        Self { mode: Mode::power_up(time_s), latch: None, time_s, messages: Vec::new() }
+        Self { mode: Mode::power_up(time_s), latch: None, time_s, messages: Messages::new_const() }
     }
 
     /// Restores a mode after a reset. Its effects were carried out before, and are not repeated.
@@ -69,21 +73,26 @@ impl PhaseTable {
             }
         }
         if let Some((severity, words)) = words_of_landing_here(before.interlocks, &self.mode) {
-            self.report(severity, words.to_owned());
+            self.report(severity, words);
         }
         if self.mode.phase != before.phase {
-            self.messages.push(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
+            self.send(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
         }
         Ok(next.effects)
     }
 
     /// Sends a message to the crew.
-    pub(crate) fn report(&mut self, severity: Severity, text: String) {
-        self.messages.push(CrewMessage::Text { severity, text });
+    pub(crate) fn report(&mut self, severity: Severity, words: impl Display) {
+        self.send(CrewMessage::Text { severity, text: text!("{words}") });
+    }
+
+    /// A message without room is left out.
+    fn send(&mut self, message: CrewMessage) {
+        let _ = self.messages.try_push(message);
     }
 
     /// Takes the messages of this frame, in order.
-    pub(super) fn take_messages(&mut self) -> Vec<CrewMessage> {
+    pub(super) fn take_messages(&mut self) -> Messages {
         core::mem::take(&mut self.messages)
     }
 }
@@ -129,7 +138,7 @@ impl Computer {
         }?;
         if before == Phase::Boost && self.table.mode().phase.on_pad() {
             let words = "the ascent motor's igniter is off; it had current: the motor may still light";
-            self.table.report(Severity::Critical, words.into());
+            self.table.report(Severity::Critical, words);
         }
         Ok(effects)
     }

@@ -1,13 +1,12 @@
 //! Sensor health: which sensors are silent, and which report implausible values. One set of rules,
 //! used before arming, until the igniter is energised, in flight, and on a log.
 
-use alloc::format;
-use alloc::string::String;
 use nalgebra::{SVector, Vector3};
 use serde::Serialize;
 
 use super::estimator::Measurements;
 use super::estimator::alignment::AT_REST_M_S2;
+use crate::text::{Text, text};
 
 /// The sensors, as their arming checks name them.
 pub const SENSORS: [&str; 5] = ["accelerometer", "gyro", "barometer", "GNSS", "lidar"];
@@ -103,12 +102,12 @@ impl<const N: usize> Channel<N> {
 
     /// The channel's loss as text: it is silent for too long, or has repeated one value for
     /// `frozen` samples.
-    fn lost(&self, name: &str, time_s: f64, longest_s: f64, frozen: u32) -> Option<String> {
+    fn lost(&self, name: &str, time_s: f64, longest_s: f64, frozen: u32) -> Option<Text> {
         let silent_s = self.silent_s(time_s);
         let repeats = || self.repeats_for_s(frozen, time_s);
         (silent_s > longest_s)
-            .then(|| format!("{name} silent for {silent_s:.1} s"))
-            .or_else(|| repeats().map(|for_s| format!("{name} repeats one value for {for_s:.1} s")))
+            .then(|| text!("{name} silent for {silent_s:.1} s"))
+            .or_else(|| repeats().map(|for_s| text!("{name} repeats one value for {for_s:.1} s")))
     }
 }
 
@@ -242,13 +241,13 @@ impl SensorWatch {
     }
 
     /// The defect of each of the [`SENSORS`] of a vehicle at rest, as text for the crew.
-    pub fn defects(&self, rests: Rests) -> [Option<String>; SENSORS.len()] {
+    pub fn defects(&self, rests: Rests) -> [Option<Text>; SENSORS.len()] {
         let time_s = self.time_s;
         let sensed_m_s2 = self.sensed_m_s2.norm();
         let accelerometer =
             self.accelerometer.lost("accelerometer", time_s, IMU_LOST_S, FROZEN_IMU).or_else(|| {
                 let wrong = !AT_REST_M_S2.contains(&sensed_m_s2) && rests != Rests::Hanging;
-                wrong.then(|| format!("accelerometer reads {sensed_m_s2:.1} m/s2 at rest, not 9.8"))
+                wrong.then(|| text!("accelerometer reads {sensed_m_s2:.1} m/s2 at rest, not 9.8"))
             });
         let gyro = self.gyro.lost("gyro", time_s, IMU_LOST_S, FROZEN_IMU);
         let place_m = match rests {
@@ -259,21 +258,21 @@ impl SensorWatch {
         let barometer = barometer.or_else(|| {
             let off_m = self.barometer.last[0] - place_m?.z;
             (off_m.abs() > BAROMETER_OFF_M)
-                .then(|| format!("barometer {off_m:.0} m off: power cycle to zero it"))
+                .then(|| text!("barometer {off_m:.0} m off: power cycle to zero it"))
         });
         let gnss_silent_s = self.gnss.silent_s(time_s);
         let gnss = (gnss_silent_s > GNSS_LOST_S)
-            .then(|| format!("no GNSS fix for {gnss_silent_s:.1} s"))
+            .then(|| text!("no GNSS fix for {gnss_silent_s:.1} s"))
             .or_else(|| {
                 let off_m = (self.fixed_m - place_m?).norm();
-                (self.gnss.has_sample && off_m > GNSS_OFF_M).then(|| format!("GNSS {off_m:.0} m off"))
+                (self.gnss.has_sample && off_m > GNSS_OFF_M).then(|| text!("GNSS {off_m:.0} m off"))
             });
         let lidar = match rests {
             Rests::Standing { range_m, .. } if range_m >= LIDAR_BLIND_M => {
                 self.lidar.lost("lidar", time_s, LIDAR_LOST_S, FROZEN_RANGES).or_else(|| {
                     let off = self.ranges_m.iter().all(|found_m| (found_m - range_m).abs() > LIDAR_OFF_M);
                     let found_m = self.ranges_m[0];
-                    off.then(|| format!("lidar {found_m:.2} m at rest, not {range_m:.2}"))
+                    off.then(|| text!("lidar {found_m:.2} m at rest, not {range_m:.2}"))
                 })
             }
             Rests::Standing { .. } | Rests::Hanging => None,

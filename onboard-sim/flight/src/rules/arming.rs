@@ -1,14 +1,12 @@
 //! The arming checks on the pad, and the type of a check.
 
-use alloc::borrow::ToOwned as _;
-use alloc::string::String;
-use alloc::vec::Vec;
-use alloc::{format, vec};
+use arrayvec::ArrayVec;
 use serde::Serialize;
 
 use crate::estimation::sensor_watch::SENSORS;
 use crate::rules::phase::UPLINK_PROVEN_S;
 use crate::rules::verdict::LandingVerdict;
+use crate::text::{Text, text};
 use crate::vehicle::drop::LOWEST_ARMED_M;
 use crate::vehicle::mission::ArmingLimits;
 
@@ -30,12 +28,12 @@ pub struct PredictedLanding {
     /// Inside every touchdown limit.
     pub lands: bool,
     /// The broken limits with their values, as text.
-    pub found: String,
+    pub found: Text,
 }
 
 impl From<&LandingVerdict> for PredictedLanding {
     fn from(verdict: &LandingVerdict) -> Self {
-        Self { lands: verdict.is_inside(), found: verdict.summary() }
+        Self { lands: verdict.is_inside(), found: text!("{}", verdict.summary()) }
     }
 }
 
@@ -59,7 +57,7 @@ pub struct ArmingInput {
     /// A vehicle check moves the surfaces, or observes the sensors.
     pub is_checking: bool,
     /// The defect of each of the [`SENSORS`], as text.
-    pub sensor_defects: [Option<String>; SENSORS.len()],
+    pub sensor_defects: [Option<Text>; SENSORS.len()],
     /// Height of a vehicle that hangs below a drone, m; `None` on a pad.
     pub hanging_m: Option<f64>,
     /// The estimator has settled.
@@ -82,24 +80,27 @@ pub struct ArmingInput {
     /// The rehearsal of the landing found plans and landed.
     pub controller_warm: bool,
     /// The rehearsal's outcome as text.
-    pub controller_found: String,
+    pub controller_found: Text,
     /// The verdict on the rehearsal's end by the touchdown limits; `None` without a rehearsal.
     pub predicted_landing: Option<PredictedLanding>,
     /// The radio link to the requesting station.
     pub uplink: Uplink,
 }
 
+/// The arming checks.
+pub type Checks = ArrayVec<Check, { 16 + SENSORS.len() }>;
+
 /// Every arming check with its value, in the order in which an operator resolves them.
-pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
-    let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
-    let mut checks = vec![
+pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
+    let mib = |bytes: u64| text!("{} MiB", bytes >> 20);
+    let mut checks = Checks::from_iter([
         Check::condition(
             "abort latch",
             !input.abort_latched && input.pad_wait_s.is_none(),
             "clear",
             &match input.pad_wait_s.filter(|_| !input.abort_latched) {
-                Some(wait_s) => format!("keep away for {wait_s:.0} s"),
-                None => "latched: restart to clear it".to_owned(),
+                Some(wait_s) => text!("keep away for {wait_s:.0} s"),
+                None => text!("latched: restart to clear it"),
             },
         ),
         Check::condition("pin", input.pin_out, "out", "in"),
@@ -109,14 +110,11 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             "passed",
             if input.is_checking { "a check of the vehicle runs" } else { "not passed" },
         ),
-    ];
+    ]);
     // Before the checks of derived values: the faulty sensor is named, not the value that it
     // spoils.
     checks.extend(
-        SENSORS
-            .into_iter()
-            .zip(&input.sensor_defects)
-            .map(|(name, defect)| Check::sensor(name, defect.as_ref())),
+        SENSORS.into_iter().zip(&input.sensor_defects).map(|(name, defect)| Check::sensor(name, *defect)),
     );
     checks.extend([
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
@@ -130,13 +128,13 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
             name: "log space",
             passed: input.log_space_bytes >= limits.log_space_min_bytes,
             found: mib(input.log_space_bytes),
-            required: format!("at least {}", mib(limits.log_space_min_bytes)),
+            required: text!("at least {}", mib(limits.log_space_min_bytes)),
         },
         Check {
             name: "controller warm",
             passed: input.controller_warm,
-            found: input.controller_found.clone(),
-            required: "a rehearsal that lands".to_owned(),
+            found: input.controller_found,
+            required: text!("a rehearsal that lands"),
         },
         predicted_landing(input.predicted_landing.as_ref()),
         uplink(input.uplink),
@@ -146,8 +144,8 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Vec<Check> {
         checks.push(Check {
             name: "height below the drone",
             passed: height_m >= LOWEST_ARMED_M,
-            found: format!("{height_m:.1} m"),
-            required: format!("at least {LOWEST_ARMED_M} m"),
+            found: text!("{height_m:.1} m"),
+            required: text!("at least {LOWEST_ARMED_M} m"),
         });
     }
     checks
@@ -158,15 +156,15 @@ pub const UPLINK_CHECK: &str = "uplink";
 
 fn uplink(uplink: Uplink) -> Check {
     let (passed, found) = match uplink {
-        Uplink::NotNeeded => (true, "not needed: the vehicle starts by itself".to_owned()),
-        Uplink::NeverReceived => (false, "no heartbeat of this station".to_owned()),
-        Uplink::Received { age_s } => (age_s <= UPLINK_PROVEN_S, format!("heartbeat {age_s:.1} s old")),
+        Uplink::NotNeeded => (true, text!("not needed: the vehicle starts by itself")),
+        Uplink::NeverReceived => (false, text!("no heartbeat of this station")),
+        Uplink::Received { age_s } => (age_s <= UPLINK_PROVEN_S, text!("heartbeat {age_s:.1} s old")),
     };
     Check {
         name: UPLINK_CHECK,
         passed,
         found,
-        required: format!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s"),
+        required: text!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s"),
     }
 }
 
@@ -174,11 +172,11 @@ fn uplink(uplink: Uplink) -> Check {
 fn fins_answering(input: &ArmingInput) -> Check {
     let answering = input.fins_answering.iter().filter(|answers| **answers).count();
     let (passed, found, required) = match input.seers {
-        None => (answering == input.fins_answering.len(), format!("{answering} of 4"), "4 of 4".to_owned()),
+        None => (answering == input.fins_answering.len(), text!("{answering} of 4"), text!("4 of 4")),
         Some(seers) => (
             seers >= SEERS,
-            format!("servos that tell nothing, seen by {seers}"),
-            format!("{SEERS} people who saw a check move them"),
+            text!("servos that tell nothing, seen by {seers}"),
+            text!("{SEERS} people who saw a check move them"),
         ),
     };
     Check { name: "fins answering", passed, found, required }
@@ -190,13 +188,13 @@ fn battery(limits: &ArmingLimits, battery_v: Option<f64>, servo_battery_v: Optio
     if let Some(volts) = servo_battery_v.filter(too_low)
         && battery_v.is_none_or(|volts| volts >= limits.battery_min_v)
     {
-        let required = format!("at least {:.1} V", limits.servo_battery_min_v);
-        return Check { name: "battery", passed: false, found: format!("servos {volts:.2} V"), required };
+        let required = text!("at least {:.1} V", limits.servo_battery_min_v);
+        return Check { name: "battery", passed: false, found: text!("servos {volts:.2} V"), required };
     }
-    let required = format!("at least {:.1} V", limits.battery_min_v);
+    let required = text!("at least {:.1} V", limits.battery_min_v);
     let (passed, found) = match battery_v {
-        None => (true, "not measured".to_owned()),
-        Some(volts) => (volts >= limits.battery_min_v, format!("{volts:.2} V")),
+        None => (true, text!("not measured")),
+        Some(volts) => (volts >= limits.battery_min_v, text!("{volts:.2} V")),
     };
     Check { name: "battery", passed, found, required }
 }
@@ -205,8 +203,8 @@ fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
     Check {
         name: "predicted touchdown",
         passed: predicted.is_some_and(|landing| landing.lands),
-        found: predicted.map_or_else(|| "no prediction".to_owned(), |landing| landing.found.clone()),
-        required: "inside every touchdown limit".to_owned(),
+        found: predicted.map_or_else(|| text!("no prediction"), |landing| landing.found),
+        required: text!("inside every touchdown limit"),
     }
 }
 
@@ -220,16 +218,16 @@ pub struct Check {
     /// Whether it passed.
     pub passed: bool,
     /// The value found, with its unit.
-    pub found: String,
+    pub found: Text,
     /// The value required, with its unit.
-    pub required: String,
+    pub required: Text,
 }
 
 impl Check {
     /// A check of a yes-or-no condition, with a text for each result.
     pub(crate) fn condition(name: &'static str, passed: bool, yes: &str, no: &str) -> Self {
         let found = if passed { yes } else { no };
-        Self { name, passed, found: found.to_owned(), required: yes.to_owned() }
+        Self { name, passed, found: text!("{found}"), required: text!("{yes}") }
     }
 
     /// A check of a magnitude against a limit. NaN fails.
@@ -237,26 +235,22 @@ impl Check {
         Self {
             name,
             passed: value.abs() <= limit,
-            found: if value.is_nan() { "not known".to_owned() } else { format!("{:.2} {unit}", value.abs()) },
-            required: format!("at most {limit} {unit}"),
+            found: if value.is_nan() { text!("not known") } else { text!("{:.2} {unit}", value.abs()) },
+            required: text!("at most {limit} {unit}"),
         }
     }
 
     /// A check of a sensor; the defect contains the sensor's name.
-    fn sensor(name: &'static str, defect: Option<&String>) -> Self {
-        let found = defect.cloned().unwrap_or_else(|| "speaks".to_owned());
-        Self { name, passed: defect.is_none(), found, required: String::new() }
+    fn sensor(name: &'static str, defect: Option<Text>) -> Self {
+        let found = defect.unwrap_or_else(|| text!("speaks"));
+        Self { name, passed: defect.is_none(), found, required: Text::new() }
     }
 
     /// The refusal as text, or `None` if passed.
-    pub fn refusal(&self) -> Option<String> {
+    pub fn refusal(&self) -> Option<Text> {
         let Self { name, found, required, .. } = self;
         let words = || {
-            if required.is_empty() {
-                found.clone()
-            } else {
-                format!("{name}: found {found}, required {required}")
-            }
+            if required.is_empty() { *found } else { text!("{name}: found {found}, required {required}") }
         };
         (!self.passed).then(words)
     }
@@ -268,7 +262,7 @@ pub fn all_passed(checks: &[Check]) -> bool {
 }
 
 /// The first failed check as text, or `None` if all passed.
-pub fn first_refusal(checks: &[Check]) -> Option<String> {
+pub fn first_refusal(checks: &[Check]) -> Option<Text> {
     checks.iter().find_map(Check::refusal)
 }
 
@@ -297,8 +291,8 @@ mod tests {
             battery_v: Some(ArmingLimits::default().battery_min_v),
             servo_battery_v: Some(ArmingLimits::default().servo_battery_min_v),
             controller_warm: true,
-            controller_found: "converged".to_owned(),
-            predicted_landing: Some(PredictedLanding { lands: true, found: String::new() }),
+            controller_found: text!("converged"),
+            predicted_landing: Some(PredictedLanding { lands: true, found: Text::new() }),
             uplink: Uplink::Received { age_s: UPLINK_PROVEN_S },
         }
     }
@@ -338,10 +332,10 @@ mod tests {
                 input.is_checking = true;
             }),
             ("no GNSS fix for 9 s", |input| {
-                input.sensor_defects[3] = Some("no GNSS fix for 9 s".to_owned());
+                input.sensor_defects[3] = Some(text!("no GNSS fix for 9 s"));
             }),
             ("lidar silent", |input| {
-                input.sensor_defects[4] = Some("lidar silent for 2 s".to_owned());
+                input.sensor_defects[4] = Some(text!("lidar silent for 2 s"));
             }),
             ("tilt from vertical: found 6.00 deg, required at most 5 deg", |input| {
                 input.tilt_rad = 6.0_f64.to_radians();

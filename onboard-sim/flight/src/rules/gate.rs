@@ -7,9 +7,7 @@
 //! One list serves three uses: which checks inhibit ignition now, which ones abandon the landing
 //! because they will not recover, and what is reported to the crew about both.
 
-use alloc::format;
-use alloc::string::String;
-
+use crate::text::{Text, text};
 use crate::vehicle::mission::GateLimits;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,9 +105,9 @@ pub fn checks(limits: &GateLimits, input: &GateInput) -> [GateCheck; GATE_CHECKS
 
 impl GateCheck {
     /// The check with its result, as text.
-    pub fn words(&self) -> String {
+    pub fn words(&self) -> Text {
         let Self { name, found, limit, unit, .. } = self;
-        if limit.is_nan() { (*name).into() } else { format!("{name} {found:.0} {unit}, limit {limit:.0}") }
+        if limit.is_nan() { text!("{name}") } else { text!("{name} {found:.0} {unit}, limit {limit:.0}") }
     }
 }
 
@@ -216,11 +214,11 @@ mod tests {
         for (tilt_deg, lasts) in [(25.0_f64, false), (41.0, true)] {
             let shut = shut_after(|input| input.tilt_rad = tilt_deg.to_radians());
             assert_eq!(shut[0].lasts, lasts);
-            assert_eq!(shut[0].words(), format!("tilt {tilt_deg:.0} deg, limit 20"));
+            assert_eq!(shut[0].words(), text!("tilt {tilt_deg:.0} deg, limit 20"));
         }
         let shut = shut_after(|input| input.touchdown_distance_m = 131.0);
         assert!(shut[0].lasts);
-        assert_eq!(shut[0].words(), "touchdown beyond the fence 131 m, limit 120");
-        assert_eq!(shut_after(|input| input.lands_ahead = false)[0].words(), "no landing ahead");
+        assert_eq!(shut[0].words().as_str(), "touchdown beyond the fence 131 m, limit 120");
+        assert_eq!(shut_after(|input| input.lands_ahead = false)[0].words().as_str(), "no landing ahead");
     }
 }

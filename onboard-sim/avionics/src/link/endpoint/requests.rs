@@ -8,7 +8,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use flight::computer::Commander;
-use flight::computer::crew::{Answer, CrewCommand, Ending, People, Request};
+use flight::computer::crew::{Answer, CrewCommand, Ending, People, Request, Requests};
 use flight::computer::messages::Severity;
 use flight::rules::arming::Uplink;
 use flight::rules::operator::Operator;
@@ -28,6 +28,8 @@ use crate::link::vehicle::VehicleState;
 /// Most commands that may wait for one frame (some milliseconds); more are refused for now. So many
 /// aborts of no operator may wait beside them; one would do.
 const MAX_WAITING: usize = 64;
+/// Largest number that one frame decides; the vehicle's programme may add some.
+const MAX_DECIDED: usize = 8;
 /// How many answers are remembered, in case their commands are repeated.
 const MAX_ANSWERED: usize = 16;
 
@@ -39,7 +41,7 @@ pub struct UplinkState {
     /// The station that armed the vehicle, if one did.
     pub commander: Option<Commander>,
     /// In order.
-    pub requests: Vec<Request>,
+    pub requests: Requests,
 }
 
 /// A command that the vehicle decides in its next frame.
@@ -130,7 +132,7 @@ impl VehicleEndpoint {
 
     /// Uplink state for the vehicle's next frame, with the crew's requests.
     pub fn uplink_state(&self, time_s: f64) -> UplinkState {
-        let requests = self.waiting.iter().map(|waiting| waiting.request).collect();
+        let requests = self.waiting.iter().take(MAX_DECIDED).map(|waiting| waiting.request).collect();
         if self.starts_by_itself {
             return UplinkState { uplink: Uplink::NotNeeded, commander: None, requests };
         }
@@ -147,8 +149,9 @@ impl VehicleEndpoint {
     /// `vehicle` is its state after the decision. A dead flight computer gives no answers, and its
     /// requests are dropped.
     pub fn on_answers(&mut self, answers: &[Answer], vehicle: &VehicleState<'_>) {
-        let waiting = core::mem::take(&mut self.waiting);
-        for (Waiting { path, command, request }, answer) in waiting.into_iter().zip(answers) {
+        let later = self.waiting.split_off(self.waiting.len().min(MAX_DECIDED));
+        let decided = core::mem::replace(&mut self.waiting, later);
+        for (Waiting { path, command, request }, answer) in decided.into_iter().zip(answers) {
             let link = path.link;
             self.note_commander(&request, answer, vehicle);
             // Operators are identified by their keys.

@@ -4,7 +4,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use flight::computer::crew::{CrewCommand, Ending, People, Request};
+use flight::computer::crew::{ANSWERED, CrewCommand, Ending, People, Request, Requests};
 use flight::computer::{Commander, LogState, Rehearsed, SensedInput};
 use flight::estimation::estimator::alignment::ImuCalibration;
 use flight::estimation::estimator::{
@@ -13,6 +13,7 @@ use flight::estimation::estimator::{
 use flight::rules::arming::{PredictedLanding, Uplink};
 use flight::rules::operator::{Name, Operator, Role};
 use flight::rules::two_person::Station;
+use flight::text::{Text, text};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Quaternion, UnitQuaternion, Vector2, Vector3};
 use protocol::records::{computer_v1, flight_v1};
@@ -63,6 +64,11 @@ pub trait Logged: Sized {
 
     fn to_log(&self) -> Self::Record;
 
+    /// Writes the record over an earlier one, whose lists are used again.
+    fn log_over(&self, record: &mut Self::Record) {
+        *record = self.to_log();
+    }
+
     /// # Errors
     /// The record has a value that is unknown to this build.
     fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError>;
@@ -78,6 +84,11 @@ macro_rules! record {
             fn to_log(&self) -> Self::Record {
                 let Self { $($($name:)? $field),+ } = self;
                 $record { $($field: $field.to_log(),)+ $($($beside: Default::default()),+)? }
+            }
+
+            fn log_over(&self, record: &mut Self::Record) {
+                let Self { $($($name:)? $field),+ } = self;
+                $($field.log_over(&mut record.$field);)+
             }
 
             fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
@@ -207,9 +218,30 @@ impl<const N: usize> Logged for [f64; N] {
         self.to_vec()
     }
 
+    fn log_over(&self, record: &mut Vec<f64>) {
+        record.clear();
+        record.extend_from_slice(self);
+    }
+
     fn from_log(record: &Vec<f64>, At { frame, field }: At) -> Result<Self, RecordError> {
         let wrong = |_| RecordError::Length { frame, field, found: record.len(), should: N };
         record.as_slice().try_into().map_err(wrong)
+    }
+}
+
+impl Logged for Requests {
+    type Record = Vec<computer_v1::Request>;
+
+    fn to_log(&self) -> Self::Record {
+        self.iter().map(Logged::to_log).collect()
+    }
+
+    fn from_log(record: &Self::Record, at: At) -> Result<Self, RecordError> {
+        if record.len() > ANSWERED {
+            let (found, should) = (record.len(), ANSWERED);
+            return Err(RecordError::Length { frame: at.frame, field: "requests", found, should });
+        }
+        record.iter().map(|request| Logged::from_log(request, at)).collect()
     }
 }
 
@@ -289,17 +321,24 @@ impl Logged for People {
     }
 }
 
-impl Logged for Name {
-    type Record = String;
+/// Types stored in the log as text.
+macro_rules! written {
+    ($($logged:ident: $read:expr),+) => {$(
+        impl Logged for $logged {
+            type Record = String;
 
-    fn to_log(&self) -> String {
-        self.as_str().into()
-    }
+            fn to_log(&self) -> String {
+                self.as_str().into()
+            }
 
-    fn from_log(record: &String, _: At) -> Result<Self, RecordError> {
-        Ok(Self::new(record))
-    }
+            fn from_log(record: &String, _: At) -> Result<Self, RecordError> {
+                Ok($read(record))
+            }
+        }
+    )+};
 }
+
+written!(Name: Name::new, Text: |words: &str| text!("{words}"));
 
 /// A recorded vector.
 pub fn vector_from_log(vector: &flight_v1::Vector3) -> Vector3<f64> {

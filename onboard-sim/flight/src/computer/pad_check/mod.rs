@@ -11,9 +11,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
-use alloc::format;
-use alloc::string::String;
-use alloc::vec::Vec;
+use arrayvec::ArrayVec;
 use serde::Serialize;
 
 use self::sweep::{Still, Sweep};
@@ -24,6 +22,7 @@ use super::{Computer, SensedInput};
 use crate::rules::arming::SEERS;
 use crate::rules::operator::Operator;
 use crate::rules::phase::Phase;
+use crate::text::{Text, text};
 use crate::vehicle::airframe::Airframe;
 use crate::vehicle::mission::{ArmingLimits, Mission, StartPoint};
 
@@ -69,9 +68,9 @@ pub struct PadCheck {
     /// Frame until which the surfaces return to rest.
     returns_until: u64,
     /// Findings so far, in order of detection.
-    pub findings: Vec<CheckedValue>,
+    pub findings: ArrayVec<CheckedValue, 40>,
     /// The people who have seen every surface move as shown on the crew's page.
-    seen_by: Vec<Option<Operator>>,
+    seen_by: ArrayVec<Option<Operator>, 16>,
 }
 
 /// A surface command: its number, and its angle, rad. All other surfaces rest.
@@ -142,7 +141,7 @@ impl PadCheck {
         if two && self.seen_by.contains(&by) {
             return Err("another person has to say so, too");
         }
-        self.seen_by.push(by);
+        let _ = self.seen_by.try_push(by);
         Ok(())
     }
 
@@ -175,12 +174,12 @@ impl PadCheck {
     }
 
     /// The result as text for the crew.
-    pub(super) fn words(&self) -> String {
+    pub(super) fn words(&self) -> Text {
         let mut failed = self.findings.iter().filter(|found| found.verdict == Verdict::NotOk);
         match (failed.next(), failed.count()) {
-            (None, _) => format!("check passed: {} values found", self.findings.len()),
-            (Some(first), 0) => format!("check FAILED: {}", first.item.name()),
-            (Some(first), more) => format!("check FAILED: {} and {more} more", first.item.name()),
+            (None, _) => text!("check passed: {} values found", self.findings.len()),
+            (Some(first), 0) => text!("check FAILED: {}", first.item.name()),
+            (Some(first), more) => text!("check FAILED: {} and {more} more", first.item.name()),
         }
     }
 }
@@ -237,15 +236,15 @@ impl Item {
         self.row().0
     }
 
-    fn name(self) -> String {
+    fn name(self) -> Text {
         self.row().1
     }
 
     /// Its number and name.
-    fn row(self) -> (u8, String) {
+    fn row(self) -> (u8, Text) {
         let of = |surface: usize, which: u8, words: &str| {
             let number = 3 * u8::try_from(surface).unwrap_or(u8::MAX / 4) + which;
-            (number, format!("{} {words}", SURFACE_NAMES.get(surface).unwrap_or(&"surface")))
+            (number, text!("{} {words}", SURFACE_NAMES.get(surface).unwrap_or(&"surface")))
         };
         let (number, name) = match self {
             Self::Range(surface) => return of(surface, 0, "range"),
@@ -267,7 +266,7 @@ impl Item {
             Self::LogRunning => (52, "log"),
             Self::LogSpace => (53, "log space"),
         };
-        (number, name.into())
+        (number, text!("{name}"))
     }
 }
 
@@ -349,7 +348,7 @@ impl Computer {
     }
 
     /// Why no check may run now; `None` if it may.
-    fn why_no_check(&self) -> Option<String> {
+    fn why_no_check(&self) -> Option<Text> {
         let mode = self.table.mode();
         let locks = mode.interlocks;
         let reason = match mode.phase {
@@ -360,7 +359,7 @@ impl Computer {
             Phase::Safe if self.self_test != SelfTest::Failed => "the self-test is not over",
             _ => return None,
         };
-        Some(reason.into())
+        Some(text!("{reason}"))
     }
 
     /// Begins a check. A running one continues: a repeated request does not restart it.
@@ -373,9 +372,9 @@ impl Computer {
         }
         let moves = command == CrewCommand::Check;
         self.pad_check.begin(&self.pilot.mission().airframe, moves, by);
-        let who = by.map_or_else(String::new, |by| format!("{by}: "));
+        let who = by.map_or_else(Text::new, |by| text!("{by}: "));
         let what = if moves { "gimbal and fins MOVE" } else { "nothing moves" };
-        self.table.report(Severity::Notice, format!("{who}check of the vehicle begins: {what}"));
+        self.table.report(Severity::Notice, text!("{who}check of the vehicle begins: {what}"));
         Answer::ACCEPTED
     }
 
@@ -383,11 +382,11 @@ impl Computer {
     pub(super) fn see_check(&mut self, command: CrewCommand, by: Option<Operator>) -> Answer {
         let two = matches!(self.input.people, Some(People::Two { .. }));
         if let Err(reason) = self.pad_check.see(by, two) {
-            return Answer { ending: Ending::NotNow, ..self.deny(command, reason.into()) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, text!("{reason}")) };
         }
-        let who = by.map_or_else(|| "one person".into(), |by| format!("{by}"));
+        let who = by.map_or_else(|| text!("one person"), |by| text!("{by}"));
         let words =
-            format!("{who} saw all surfaces move as they should: {} of {SEERS}", self.pad_check.seers());
+            text!("{who} saw all surfaces move as they should: {} of {SEERS}", self.pad_check.seers());
         self.table.report(Severity::Notice, words);
         Answer::ACCEPTED
     }
@@ -397,7 +396,7 @@ impl Computer {
         let ran = self.pad_check.stop(self.input.frame);
         if ran {
             self.rest_surfaces();
-            self.table.report(Severity::Warning, format!("check of the vehicle ended early: {why}"));
+            self.table.report(Severity::Warning, text!("check of the vehicle ended early: {why}"));
         }
         ran
     }

@@ -1,8 +1,7 @@
 //! Moves one surface after another to both ends of its range and observes its feedback. Then reads
 //! the sensors with the vehicle at rest.
 
-use alloc::vec;
-use alloc::vec::Vec;
+use arrayvec::ArrayVec;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -52,12 +51,9 @@ impl Reach {
     }
 
     /// Target angles, in order; the last is its rest.
-    fn targets_rad(&self) -> Vec<f64> {
-        if self.low_rad < self.rest_rad {
-            vec![self.high_rad, self.low_rad, self.rest_rad]
-        } else {
-            vec![self.high_rad, self.rest_rad]
-        }
+    fn targets_rad(&self) -> ArrayVec<f64, 3> {
+        let low_rad = (self.low_rad < self.rest_rad).then_some(self.low_rad);
+        [Some(self.high_rad), low_rad, Some(self.rest_rad)].into_iter().flatten().collect()
     }
 
     /// Time until a servo without delay, at its rate, counts as arrived, s.

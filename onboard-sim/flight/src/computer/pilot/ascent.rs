@@ -1,8 +1,6 @@
 //! Detects lift-off, burnout, the time to separate the booster, and apogee from the sensors; also a
 //! stuck fin.
 
-use alloc::format;
-use alloc::string::String;
 use serde::{Deserialize, Serialize};
 
 use super::vertical_speed::{APART_OF_TWO_M_S, RATE_OVER_S, VerticalSpeeds};
@@ -10,6 +8,7 @@ use crate::computer::messages::Severity;
 use crate::computer::pad::ANSWERING_RAD;
 use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Event, Phase};
+use crate::text::{Text, text};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// Axial specific force above which the vehicle is under thrust, m/s^2. At rest it is 9.8; the
@@ -257,26 +256,27 @@ fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
 }
 
 /// The crew message for an event.
-pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Severity, String)> {
+pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Severity, Text)> {
     let state = &estimate.state;
     let message = match event {
-        Event::LiftOff => (Severity::Notice, "LIFT-OFF".into()),
+        Event::LiftOff => (Severity::Notice, text!("LIFT-OFF")),
         Event::NoLiftOff => (
             Severity::Critical,
-            format!("no lift-off within {LIFT_OFF_WITHIN_S} s: the ascent motor may still light"),
+            text!("no lift-off within {LIFT_OFF_WITHIN_S} s: the ascent motor may still light"),
         ),
         Event::Burnout => {
-            let words = format!(
+            let words = text!(
                 "ascent motor burnt out at {:.0} m, {:.0} m/s",
-                state.position_m.z, state.velocity_m_s.z
+                state.position_m.z,
+                state.velocity_m_s.z
             );
             (Severity::Notice, words)
         }
         Event::Apogee { booster_attached: true } => {
-            (Severity::Critical, "the booster has not separated: no landing, parachute".into())
+            (Severity::Critical, text!("the booster has not separated: no landing, parachute"))
         }
         Event::Apogee { booster_attached: false } => {
-            (Severity::Notice, format!("APOGEE at {:.0} m", state.position_m.z))
+            (Severity::Notice, text!("APOGEE at {:.0} m", state.position_m.z))
         }
         _ => return None,
     };

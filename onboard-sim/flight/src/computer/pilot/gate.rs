@@ -1,9 +1,7 @@
 //! Phase changes of descent and landing: the ignition behind its gate, and the parachute while
 //! there is height for it, if the landing is abandoned.
 
-use alloc::format;
-use alloc::string::String;
-use alloc::vec::Vec;
+use core::fmt::Write as _;
 
 use super::Pilot;
 use crate::computer::SensedInput;
@@ -13,6 +11,7 @@ use crate::estimation::estimator::{Estimate, Health, HealthIssue};
 use crate::estimation::sensor_watch::SensorWatch;
 use crate::rules::gate::{self, GATE_CHECKS, GateCheck, GateInput};
 use crate::rules::phase::{Effect, Effects, Event, Mode, Motor, NO_THRUST_TIMEOUT_S, Phase, Refusal};
+use crate::text::{Text, text};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 
 /// Distance of a fin from its command beyond which it has not arrived, rad.
@@ -48,7 +47,7 @@ impl Pilot {
         if let Some((hopeless, why)) = self.gate_will_not_open(table.mode(), seen)
             && self.apply(table, hopeless, time_s).is_ok()
         {
-            table.report(Severity::Critical, format!("no landing: {why}"));
+            table.report(Severity::Critical, text!("no landing: {why}"));
             self.gave_up = Some(why);
         }
         match table.mode().phase {
@@ -222,7 +221,7 @@ impl Pilot {
     /// last chance for the parachute with its margin. Below: ignition is due and refused, or no
     /// landing is possible any more. The motor must never be ignited outside the gate, so only the
     /// parachute is left, without the margin.
-    fn gate_will_not_open(&mut self, mode: &Mode, seen: Seen<'_>) -> Option<(Event, String)> {
+    fn gate_will_not_open(&mut self, mode: &Mode, seen: Seen<'_>) -> Option<(Event, Text)> {
         let checks = self.gate_checks(mode, seen);
         let Seen { input, estimate, sensors } = seen;
         for (check, since_s) in checks.iter().zip(&mut self.shut_since_s) {
@@ -286,7 +285,7 @@ impl Pilot {
     }
 
     /// All causes, with values and durations: the lasting ones, or else the checks that fail now.
-    fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> String {
+    fn why_given_up(&self, checks: &[GateCheck; GATE_CHECKS], time_s: f64) -> Text {
         let for_s = |since_s: &Option<f64>| since_s.map_or(0.0, |since_s| time_s - since_s);
         // A moving fin fails for a moment and is left out beside a lasting cause.
         let keeps: [fn(&GateCheck, f64) -> bool; 3] =
@@ -294,11 +293,14 @@ impl Pilot {
         let mut causes = keeps.iter().map(|keep| {
             let lasting =
                 checks.iter().zip(&self.shut_since_s).filter(|(check, since_s)| keep(check, for_s(since_s)));
-            let words =
-                lasting.map(|(check, since_s)| format!("{}, for {:.1} s", check.words(), for_s(since_s)));
-            words.collect::<Vec<_>>().join("; ")
+            let mut words = Text::new();
+            for (check, since_s) in lasting {
+                let separator = if words.is_empty() { "" } else { "; " };
+                let _ = write!(words, "{separator}{}, for {:.1} s", check.words(), for_s(since_s));
+            }
+            words
         });
-        causes.find(|causes| !causes.is_empty()).unwrap_or_else(|| "too low for the landing motor".into())
+        causes.find(|causes| !causes.is_empty()).unwrap_or_else(|| text!("too low for the landing motor"))
     }
 }
 

@@ -16,7 +16,6 @@ mod vehicle_model;
 mod vertical_speed;
 
 use alloc::boxed::Box;
-use alloc::string::String;
 use alloc::sync::Arc;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +31,7 @@ use crate::estimation::estimator::{Estimate, Estimator, Measurements, StartUncer
 use crate::estimation::motor_estimate::{MotorEstimate, MotorPrior};
 use crate::guidance::powered::{ControlLevel, PoweredGuidance, PoweredReport};
 use crate::rules::gate::GATE_CHECKS;
+use crate::text::Text;
 use crate::vehicle::airframe::MassModel;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use crate::vehicle::mission::{Mission, StartPoint};
@@ -86,7 +86,7 @@ pub struct Pilot {
     shut_since_s: [Option<f64>; GATE_CHECKS],
     /// Why the landing was abandoned. It decides nothing.
     #[serde(skip)]
-    gave_up: Option<String>,
+    gave_up: Option<Text>,
 }
 
 impl Pilot {

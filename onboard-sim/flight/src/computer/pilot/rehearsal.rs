@@ -4,8 +4,6 @@
 //! It shows whether the planner works on this machine, and whether a landing is possible with this
 //! vehicle, motor and mission.
 
-use alloc::format;
-
 use nalgebra::{Vector2, Vector3};
 
 use super::planner::{Planner, Problem};
@@ -14,6 +12,7 @@ use crate::computer::Rehearsed;
 use crate::estimation::estimator::Estimate;
 use crate::rules::arming::PredictedLanding;
 use crate::rules::verdict::{LandingVerdict, Limits};
+use crate::text::text;
 use crate::vehicle::rigid::RigidState;
 
 /// Interval of the search for the ignition in the fall, s, and number of steps.
@@ -42,7 +41,7 @@ impl Planner {
         let verdict = LandingVerdict::judge_plan(&Limits::from(&mission.leg_limits), &self.end());
         let rehearsed = Rehearsed {
             warm: converged > 0 && verdict.is_inside(),
-            found: format!("planned, {converged} of {plans} plans converged"),
+            found: text!("planned, {converged} of {plans} plans converged"),
             landing: (plans > 0).then(|| PredictedLanding::from(&verdict)),
         };
         rehearsed.explained(mission)
@@ -89,7 +88,7 @@ mod tests {
         for (kg, words) in [("5.0", "too heavy for its motor"), ("2.2", "too light for its motor")] {
             let text = text.replace("loaded_kg = 3.7", &format!("loaded_kg = {kg}"));
             let mission = crate::vehicles::mission::from_toml(&text, name).unwrap();
-            let found = String::from("ended, 0 of 0 plans converged");
+            let found = text!("ended, 0 of 0 plans converged");
             let rehearsed = Rehearsed { warm: false, found, landing: None };
             let explained = rehearsed.clone().explained(&mission);
             assert!(explained.found.starts_with(words), "{explained:?}");

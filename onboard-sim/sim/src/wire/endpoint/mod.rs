@@ -15,11 +15,11 @@ pub fn step(
     vehicle: &mut Vehicle,
     local: &[Request],
 ) -> (Vec<VehicleEvent>, Vec<Answer>) {
-    let UplinkState { uplink, commander, mut requests } = endpoint.uplink_state(vehicle.time_s());
+    let UplinkState { uplink, commander, requests } = endpoint.uplink_state(vehicle.time_s());
     vehicle.set_uplink(uplink, commander);
-    requests.extend_from_slice(local);
+    let requests = [&requests, local].concat();
     let VehicleStep { events, mut answers } = vehicle.step(&requests);
-    let to_itself = answers.split_off((requests.len() - local.len()).min(answers.len()));
+    let to_itself = answers.drain((requests.len() - local.len()).min(answers.len())..).collect();
     endpoint.on_answers(&answers, &vehicle.state());
     for event in &events {
         match event {

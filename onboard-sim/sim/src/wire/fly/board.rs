@@ -24,6 +24,7 @@ use std::{io, thread};
 use avionics::board::stream;
 use avionics::board::stream::{Answer, Begin, Frame, OnTheAir, Reader, put};
 use avionics::log::logged::{At, Logged, RecordError};
+use flight::computer::crew::Requests;
 use flight::rules::arming::Uplink;
 use protocol::hub::line::SHARE;
 use protocol::identity::{LARGEST_BOOT_NUMBER, NETWORK_BUDGET_BYTES_S, RADIO_BUDGET_BYTES_S};
@@ -122,14 +123,17 @@ impl OnBoard {
 
     fn uplink_state(&self) -> Result<UplinkState, RecordError> {
         let Some(stream::RadioInput { uplink, commander, requests }) = &self.radio else {
-            return Ok(UplinkState { uplink: Uplink::NeverReceived, commander: None, requests: Vec::new() });
+            return Ok(UplinkState {
+                uplink: Uplink::NeverReceived,
+                commander: None,
+                requests: Requests::new(),
+            });
         };
         let at = At { frame: self.last.map_or(0, |last| last + 1), field: "radio" };
-        let requests = requests.iter().map(|request| Logged::from_log(request, at));
         Ok(UplinkState {
             uplink: Logged::from_log(uplink, at)?,
             commander: Logged::from_log(commander, at)?,
-            requests: requests.collect::<Result<_, _>>()?,
+            requests: Logged::from_log(requests, at)?,
         })
     }
 

@@ -8,6 +8,7 @@ use crate::recipe::Recipe;
 use flight::computer::crew::{Answer, CrewCommand, Request};
 use flight::rules::arming;
 use flight::rules::phase::Phase;
+use flight::text::{Text, text};
 use flight::vehicle::mission::StartPoint;
 use protocol::log::writer::LogHeader;
 
@@ -78,11 +79,11 @@ const READY_WITHIN_S: f64 = 10.0;
 /// Arms and starts once the checks pass.
 pub(super) struct AutoStart {
     pub(super) wanted: bool,
-    pub(super) refused: Option<String>,
+    pub(super) refused: Option<Text>,
     /// Arming and start were requested.
     pub(super) requested: bool,
     /// Why the countdown was held.
-    pub(super) held: Option<String>,
+    pub(super) held: Option<Text>,
 }
 
 impl AutoStart {
@@ -92,7 +93,7 @@ impl AutoStart {
         if self.requested && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
             // A reset has disarmed it. Only a person arms it again.
             let why = self.held.as_ref().map(|held| format!(": {held}")).unwrap_or_default();
-            self.refused.get_or_insert_with(|| format!("disarmed on the pad after it was started{why}"));
+            self.refused.get_or_insert_with(|| text!("disarmed on the pad after it was started{why}"));
         }
         if self.held.is_none() && mode.hold.is_some() {
             self.held = arming::first_refusal(&vehicle.arming_checks());
@@ -114,8 +115,7 @@ impl AutoStart {
 
     /// Takes the answer to the request.
     pub(super) fn on_answers(&mut self, answers: &[Answer]) {
-        self.refused =
-            self.refused.take().or_else(|| answers.iter().find_map(|answer| answer.reason.clone()));
+        self.refused = self.refused.take().or_else(|| answers.iter().find_map(|answer| answer.reason));
     }
 }
 

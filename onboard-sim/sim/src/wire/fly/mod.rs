@@ -16,6 +16,7 @@ use avionics::board::stream::OnTheAir;
 use flight::computer::FRAME_S;
 use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
+use flight::text::Text;
 pub use flight::vehicle::mission::StartPoint;
 pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
@@ -175,7 +176,7 @@ pub enum FlightEnd {
     /// Aborted before or without a landing.
     Aborted,
     /// Arming or starting was refused.
-    Refused(String),
+    Refused(Text),
     /// Stopped from outside before its end.
     Stopped,
 }
@@ -281,7 +282,7 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
 }
 
 /// How a flight has ended.
-fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
+fn outcome_of(vehicle: &Vehicle, refused: Option<Text>, stopped: bool) -> FlightEnd {
     match (vehicle.judged().map(|judged| judged.landing.stands), refused) {
         // An abort stays an abort, whatever the landing; the verdict is reported separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,
@@ -333,11 +334,11 @@ pub async fn fly_observed(
         }
         let warnings = [move_pin(options.pin_out.as_mut(), &mut vehicle), saved_abort.save(&vehicle)];
         for text in warnings.into_iter().flatten() {
-            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, text));
+            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, &text));
         }
         let arrived = links.receive(vehicle.time_s());
         for text in links.down.drain(..) {
-            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, text));
+            observe(vehicle.time_s(), &VehicleEvent::text(Severity::Warning, &text));
         }
         for (path, event) in uplink_radio.pass(arrived, vehicle.time_s(), vehicle.radio()) {
             receive(&mut endpoint, path, &event, &vehicle);

@@ -39,7 +39,7 @@ impl GroundWatch {
         if let Some(touchdown) = world.touchdown().filter(|_| self.contacts == 0) {
             self.contacts = 1;
             let text = format!("ground contact at {:.2} m/s", touchdown.over_ground.vertical_m_s);
-            events.push(VehicleEvent::text(Severity::Notice, text));
+            events.push(VehicleEvent::text(Severity::Notice, &text));
         }
         if sortie.goes_on() {
             return events;
@@ -51,7 +51,7 @@ impl GroundWatch {
             self.judged = Some(Judged { time_s, touchdown, landing });
             events.push(VehicleEvent::Verdict);
             let text = in_words(&outcome, sortie.computer().mode().interlocks.abort_latched);
-            events.push(VehicleEvent::text(Severity::Notice, text));
+            events.push(VehicleEvent::text(Severity::Notice, &text));
         }
         let waited_s = world.rest().map_or(f64::INFINITY, |rest| world.time_s() - rest.time_s);
         let phase = sortie.computer().mode().phase;
@@ -59,7 +59,7 @@ impl GroundWatch {
         if unnoticed && waited_s > UNNOTICED_S && !self.given_up {
             self.given_up = true;
             let text = format!("the simulation ends here, in {}", phase.name());
-            events.push(VehicleEvent::text(Severity::Error, text));
+            events.push(VehicleEvent::text(Severity::Error, &text));
         }
         events
     }

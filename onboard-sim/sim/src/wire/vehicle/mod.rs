@@ -13,14 +13,15 @@ use crate::recipe::Recipe;
 use crate::sortie::{Radio, SetUpError, Sortie};
 use crate::wire::record::LastFrame;
 pub use avionics::link::vehicle::{BatteryFacts, Judged, MissionName, VehicleState};
-use flight::computer::crew::{Answer, People, Request};
+use flight::computer::crew::{Answers, People, Request};
 use flight::computer::findings::Findings;
 use flight::computer::messages::{CrewMessage, Severity};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::computer::{Commander, Computer, LogState, SensedInput};
-use flight::rules::arming::{Check, Uplink};
+use flight::rules::arming::{Checks, Uplink};
 use flight::rules::operator::Operator;
 use flight::rules::phase::{Mode, Phase};
+use flight::text::text;
 use flight::vehicle::mission::StartPoint;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::PilotTiming;
@@ -61,7 +62,7 @@ pub struct VehicleStep {
     /// Events, in order.
     pub events: Vec<VehicleEvent>,
     /// An answer to each request, in order; none while the flight computer is dead.
-    pub answers: Vec<Answer>,
+    pub answers: Answers,
 }
 
 impl Vehicle {
@@ -131,7 +132,7 @@ impl Vehicle {
         self.computer_frame = self.last.take();
         self.frames_decided += u64::from(self.computer_frame.is_some());
         let mut events = Vec::new();
-        let (mut released, mut answers) = (false, Vec::new());
+        let (mut released, mut answers) = (false, Answers::new());
         if let Some(output) = output {
             events.extend(output.messages.into_iter().map(VehicleEvent::Message));
             if output.planned {
@@ -164,7 +165,7 @@ impl Vehicle {
         }
         let height_m = self.sortie.world().height_m();
         let text = format!("the simulation goes on at apogee, {height_m:.0} m up; no ascent is flown");
-        vec![VehicleEvent::text(Severity::Notice, text)]
+        vec![VehicleEvent::text(Severity::Notice, &text)]
     }
 
     /// Its flight computer.
@@ -219,7 +220,7 @@ impl Vehicle {
     }
 
     /// The arming checks with the present values.
-    pub fn arming_checks(&self) -> Vec<Check> {
+    pub fn arming_checks(&self) -> Checks {
         self.computer().arming_checks()
     }
 
@@ -248,8 +249,8 @@ pub enum VehicleEvent {
 }
 
 impl VehicleEvent {
-    pub(crate) fn text(severity: Severity, text: String) -> Self {
-        Self::Message(CrewMessage::Text { severity, text })
+    pub(crate) fn text(severity: Severity, text: &str) -> Self {
+        Self::Message(CrewMessage::Text { severity, text: text!("{text}") })
     }
 }
 
