@@ -11,11 +11,14 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use protocol::dialect::{MavMessage, TdPhase};
+use protocol::field::Field;
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
+use protocol::log::record::{METADATA_RUN, TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
+use protocol::motion::Degrees;
+use sim::wire::field::RUN_FACT;
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
@@ -44,6 +47,8 @@ pub struct Recording {
     pub damage: Option<String>,
     /// The shown vehicle: the chosen one, otherwise the first received one.
     pub vehicle: Option<Address>,
+    /// The field around the pad, if the log has one.
+    pub field: Option<Field>,
 }
 
 impl Recording {
@@ -78,9 +83,10 @@ impl Recording {
             };
             anyhow::bail!("{shown}: {why}");
         };
-        let Survey { events: count, length, phases, .. } = survey;
+        let Survey { events: count, length, phases, pad, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
-        Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
+        let field = events.field.zip(pad).and_then(|(text, pad)| Field::parse(&text, pad, RUN_FACT).ok());
+        Ok(Self { damage, vehicle, field, file, side, events: count, length, phases: phases.into() })
     }
 
     /// A reader at the first event.
@@ -106,6 +112,7 @@ struct Survey {
     has_vehicle: bool,
     length: Duration,
     phases: Vec<(TdPhase, Duration)>,
+    pad: Option<Degrees>,
 }
 
 impl Survey {
@@ -114,7 +121,16 @@ impl Survey {
         self.events += 1;
         if let Msg::Frame(frame) = event {
             self.has_vehicle = true;
-            if let Some(phase) = phase_of(frame)
+            let phase = match frame.decode() {
+                Ok(MavMessage::HEARTBEAT(data)) => phase_of_heartbeat(&data),
+                Ok(MavMessage::TD_FLIGHT_STATUS(data)) => Some(data.phase),
+                Ok(MavMessage::HOME_POSITION(data)) => {
+                    self.pad = Degrees::of_e7(data.latitude, data.longitude).or(self.pad);
+                    None
+                }
+                _ => None,
+            };
+            if let Some(phase) = phase
                 && self.phases.last().is_none_or(|(last, _)| *last != phase)
                 && self.phases.len() < PHASES_MAX
             {
@@ -149,14 +165,6 @@ impl RecordingClock {
     }
 }
 
-fn phase_of(frame: &Frame) -> Option<TdPhase> {
-    match frame.decode().ok()? {
-        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(&data),
-        MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
-        _ => None,
-    }
-}
-
 // Reads the frames of a log as events, one at a time in file order, with bounded memory.
 
 /// The size of the read buffer: some thousand frames.
@@ -181,6 +189,8 @@ struct LogEvents {
     latest_ns: u64,
     /// What the last record holds.
     waiting: VecDeque<(Side, Duration, Msg)>,
+    /// The text of the field in the facts about the run.
+    field: Option<String>,
 }
 
 enum Format {
@@ -202,7 +212,7 @@ impl LogEvents {
             Format::Mcap(Box::new(LogReader::new(BufReader::with_capacity(BUFFER_BYTES, file))))
         };
         let clocks = <[RecordingClock; 2]>::default();
-        Ok(Self { format, vehicle, ground: None, clocks, latest_ns: 0, waiting: VecDeque::new() })
+        Ok(Self { format, vehicle, ground: None, clocks, latest_ns: 0, waiting: VecDeque::new(), field: None })
     }
 
     /// Why reading ended early, if it did.
@@ -224,7 +234,14 @@ impl LogEvents {
             let (side, stamp_ns, bytes) = match &mut self.format {
                 Format::Mcap(reader) => {
                     let Some(item) = reader.next_item()? else { return Ok(None) };
-                    let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
+                    let LogItem::Message { channel_id, log_time_ns, data, .. } = item else {
+                        if let LogItem::Metadata { name, mut entries } = item
+                            && name == METADATA_RUN
+                        {
+                            self.field = entries.remove(RUN_FACT).or(self.field.take());
+                        }
+                        continue;
+                    };
                     let Some(channel) = reader.channel(channel_id) else { continue };
                     let side = match channel.metadata.get("endpoint").map(String::as_str) {
                         _ if ![TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) => continue,
