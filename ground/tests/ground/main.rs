@@ -12,6 +12,7 @@ mod crew;
 mod daemon;
 mod disarm;
 mod endings;
+mod field;
 mod finding;
 mod flights;
 mod hurried_keys;
