@@ -11,6 +11,7 @@ pub mod files;
 mod next_log;
 pub mod output;
 pub mod pace;
+mod position;
 pub mod programs;
 pub mod replaying;
 pub mod screen;
@@ -28,6 +29,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use clap::{ArgMatches, ColorChoice, CommandFactory as _, FromArgMatches as _};
+use futures_util::future::OptionFuture;
 use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
@@ -56,6 +58,7 @@ use clock::{Clock, LogTime};
 use files::{LogGuard, LogWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Lines, Output, print};
+use position::Locator;
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -179,13 +182,14 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, Arc::clone(&log_guard.0));
-    let mut station = match Box::pin(start(args, config, duty, (clock, demo_options, mission), next_log)).await {
-        Ok(station) => station,
-        Err(error) => {
-            log_guard.discard();
-            return Err(error);
-        }
-    };
+    let mut station =
+        match Box::pin(start(args, config, duty, (clock, demo_options, mission), next_log)).await {
+            Ok(station) => station,
+            Err(error) => {
+                log_guard.discard();
+                return Err(error);
+            }
+        };
     if duty.is_daemon {
         print(output::greeting(&station.model).as_bytes())?;
     }
@@ -242,6 +246,7 @@ async fn start(
         Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)
     });
     let demo = demo.transpose().context("starting the simulator")?;
+    let locator = OptionFuture::from(args.flags.position.clone().map(Locator::open)).await.transpose()?;
     let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {
@@ -296,6 +301,7 @@ async fn start(
         background: Background::start("files").context("starting the thread of the files")?,
         log_watch: LogWatch::default(),
         demo,
+        locator,
         output,
         socket: args.flags.socket.socket.clone(),
         server,

@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::dialect::{MavMessage, TdPhase};
+use mavlink::MessageData as _;
+use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TdPhase};
 use protocol::field::Field;
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -22,6 +23,7 @@ use sim::wire::field::RUN_FACT;
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
+use crate::update::frames::GLOBAL_POSITION_ID;
 
 /// A larger step back in time means that the clock was set back, not that frames of two links are
 /// out of order. An MCAP log has none.
@@ -62,10 +64,15 @@ impl Recording {
         let reading = || format!("cannot read {shown}");
         let file = File::open(path).with_context(reading)?;
         let mut events = LogEvents::begin(&file, vehicle).with_context(reading)?;
+        let given = vehicle;
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
         while let Some((side, at, event)) = events.next_event().with_context(reading)? {
             let survey = if side == Side::Ground { &mut ground } else { &mut vehicle };
             survey.note(at, &event);
+        }
+        // Another system may have been received before the vehicle.
+        if let Some(ours) = events.ours.filter(|ours| given.is_none() && events.vehicle != Some(*ours)) {
+            return Self::load(path, Some(ours));
         }
         // What the ground received; if that is missing, what the vehicle sent.
         let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
@@ -191,6 +198,8 @@ struct LogEvents {
     waiting: VecDeque<(Side, Duration, Msg)>,
     /// The text of the field in the facts about the run.
     field: Option<String>,
+    /// The first sender of a flight status.
+    ours: Option<Address>,
 }
 
 enum Format {
@@ -212,7 +221,16 @@ impl LogEvents {
             Format::Mcap(Box::new(LogReader::new(BufReader::with_capacity(BUFFER_BYTES, file))))
         };
         let clocks = <[RecordingClock; 2]>::default();
-        Ok(Self { format, vehicle, ground: None, clocks, latest_ns: 0, waiting: VecDeque::new(), field: None })
+        Ok(Self {
+            format,
+            vehicle,
+            ground: None,
+            clocks,
+            latest_ns: 0,
+            waiting: VecDeque::new(),
+            field: None,
+            ours: None,
+        })
     }
 
     /// Why reading ended early, if it did.
@@ -277,12 +295,17 @@ impl LogEvents {
     /// frame of the ground.
     fn event_of(&mut self, frame: Frame) -> Option<Msg> {
         let source = frame.source();
+        if frame.message_id() == TD_FLIGHT_STATUS_DATA::ID {
+            self.ours.get_or_insert(source);
+        }
         if source.component_id == VEHICLE.component_id {
             self.vehicle.get_or_insert(source);
         } else if source.component_id == GROUND.component_id {
             self.ground.get_or_insert(source);
         }
-        if Some(source) == self.vehicle {
+        let is_tracker = frame.message_id() == GLOBAL_POSITION_ID
+            && self.vehicle.is_some_and(|vehicle| vehicle.system_id != source.system_id);
+        if Some(source) == self.vehicle || is_tracker {
             return Some(Msg::Frame(frame));
         }
         (Some(source) == self.ground).then(|| {

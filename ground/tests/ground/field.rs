@@ -3,10 +3,10 @@
 use ground::model::{Degrees, Role, Settings};
 use ground::replay::Player;
 use ground::replay::recording::Recording;
-use protocol::dialect::{HOME_POSITION_DATA, MavMessage};
+use protocol::dialect::{GLOBAL_POSITION_INT_DATA, HOME_POSITION_DATA, MavMessage, TD_FLIGHT_STATUS_DATA};
 use protocol::field::{Field, Kind};
 use protocol::frame::Encoder;
-use protocol::identity::VEHICLE;
+use protocol::identity::{Address, VEHICLE};
 use protocol::log::record::{Direction, RawFrame, Record};
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
@@ -85,7 +85,8 @@ fn a_replay_draws_the_field_of_the_log() {
         Player::new(recording, Settings { role: Role::Replaying, ..settings(false, true) }).model
     };
     let model = played("station.mcap", &[("field", &text(0.001))], &[home()]);
-    let kinds: Vec<Kind> = model.settings.field.iter().flat_map(|field| &field.lines).map(|of| of.kind).collect();
+    let kinds: Vec<Kind> =
+        model.settings.field.iter().flat_map(|field| &field.lines).map(|of| of.kind).collect();
     assert_eq!(kinds, [Kind::CrowdLine]);
     for (name, run, frames) in [
         ("no field.mcap", vec![], vec![home()]),
@@ -94,4 +95,31 @@ fn a_replay_draws_the_field_of_the_log() {
     ] {
         assert_eq!(played(name, &run, &frames).settings.field, None, "{name}");
     }
+}
+
+/// A tracker may be received first; its position is played, too.
+#[test]
+fn a_replay_shows_the_vehicle_and_not_a_tracker_that_was_received_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("station.mcap");
+    let log = Recorder::create(&path, false, &LogHeader::default()).unwrap();
+    let tracker = Address { system_id: 7, ..VEHICLE };
+    let position = MavMessage::GLOBAL_POSITION_INT(GLOBAL_POSITION_INT_DATA {
+        lat: 353_470_000,
+        lon: -1_178_090_000,
+        ..Default::default()
+    });
+    let status = MavMessage::TD_FLIGHT_STATUS(TD_FLIGHT_STATUS_DATA { boot_number: 5, ..Default::default() });
+    for (source, message) in
+        [(tracker, &position), (VEHICLE, &status), (VEHICLE, &home()), (tracker, &position)]
+    {
+        let bytes = Encoder::new(source).encode(message).as_bytes().to_vec();
+        let frame = RawFrame { direction: Direction::Rx, endpoint: "ground", link: "udp".to_owned(), bytes };
+        log.record(Record::RawFrame(frame), 0);
+    }
+    log.finish().unwrap();
+    let recording = Recording::load(&path, None).unwrap();
+    assert_eq!(recording.vehicle, Some(VEHICLE));
+    let model = Player::new(recording, Settings { role: Role::Replaying, ..settings(false, true) }).model;
+    assert!(model.events.newest(9).any(|event| event.text.starts_with("system 7 reports its position")));
 }

@@ -31,6 +31,7 @@ mod readable;
 mod replay;
 mod rig;
 mod screens;
+mod search;
 mod slips;
 mod station_log;
 mod surfaces;

@@ -12,8 +12,8 @@ use ratatui::widgets::{Paragraph, Wrap, canvas};
 
 use crate::model::field;
 use crate::model::{
-    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    Way, dead_reckoning::may_have_left, shown, standing, words,
+    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, OWN_POSITION_OLD, PadCheck, SURFACES, Sample,
+    Spot, Standing, Way, dead_reckoning::may_have_left, shown, standing, words,
 };
 use crate::view::band::Room;
 use crate::view::pictures::{Plane, qr};
@@ -204,15 +204,17 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         (walk, words, right)
     };
     let inside = framed("place", Line::default(), theme, frame, middle);
-    let place = model.last_place(now).or(model.place);
+    let place = model.sought(now);
     let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
     let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
-    match place.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
-        Some(place) => draw_arrow(place.way(&place.best(), model.settings.here), theme, frame, inside),
+    match place {
+        Some(place) => draw_arrow(place.way(&place.best(), model.here()), theme, frame, inside),
         None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
     }
-    let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
+    let flies = model.chosen_tracker().is_none()
+        && model.vehicle.in_flight()
+        && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
     let of = |rows| at.map_or_else(Vec::new, |at| qr::code(at, rows));
     // Beside large words a small screen has no rows for a border.
@@ -247,15 +249,36 @@ fn draw_arrow(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
     });
 }
 
-/// The places and the ways to them.
+/// The positions and the ways to them.
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    if may_have_left(&model.vehicle, now).is_some() {
+    let mut lines = sought_lines(model, theme, now);
+    if let Some(here) = model.here {
+        let role = if here.age(now) > OWN_POSITION_OLD { TextRole::Caution } else { TextRole::Plain };
+        lines.push(theme.line(format!("  own position {} s ago", here.age(now).as_secs()), role));
+    }
+    let trouble = model.here_trouble.as_ref();
+    lines.extend(trouble.map(|why| theme.line(format!("  own position: {why}"), TextRole::Caution)));
+    let shown = model.pages.tracker.filter(|_| model.sought(now).is_some());
+    for (id, tracker) in model.trackers.iter().filter(|(id, _)| shown != Some(**id)) {
+        let age_s = tracker.at.age(now).as_secs();
+        lines.push(theme.line(format!(" also system {id}, {age_s} s ago (Up, Down)"), TextRole::Title));
+        lines.extend(degrees(Some(tracker.at.value)));
+    }
+    lines
+}
+
+/// The position to look for, and the way there.
+fn sought_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let label = |words: &'static str| theme.line(words, TextRole::Label);
+    let tracker = model.chosen_tracker().map(|(id, _)| id);
+    if tracker.is_none() && may_have_left(&model.vehicle, now).is_some() {
         return may_have_left_lines(model, theme);
     }
-    let label = |words: &'static str| theme.line(words, TextRole::Label);
-    let Some(place) = model.last_place(now).or(model.place) else {
+    let Some(place) = model.sought(now) else {
         return vec![if model.vehicle.left_pad_at.is_some() {
             theme.line(" The vehicle has left the pad, and has not reported its position.", TextRole::Caution)
+        } else if tracker.is_some() {
+            label(" The way needs the position of the pad.")
         } else {
             label(
                 " The vehicle has not left the pad. In flight its last place is kept beside the log, for maps.",
@@ -268,17 +291,20 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         lines.push(theme.line(" PREDICTED: look here first", TextRole::Caution));
         lines.extend(spot(model, &place, predicted, theme));
     }
-    let from = if place.way(&place.received, model.settings.here).from_station { "here" } else { "the pad" };
-    lines.push(theme.line(format!(" Last received, from {from}"), TextRole::Title));
+    let from = if place.way(&place.received, model.here()).from_station { "here" } else { "the pad" };
+    let what = tracker.map_or_else(|| "Last received".to_owned(), |id| format!("SYSTEM {id}"));
+    lines.push(theme.line(format!(" {what}, from {from}"), TextRole::Title));
     lines.extend(spot(model, &place, &place.received, theme));
     let ago = now_unix_s.saturating_sub(place.received_unix_s);
     lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
-    lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
-    lines.push(supply(model, theme));
+    if tracker.is_none() {
+        lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
+        lines.push(supply(model, theme));
+    }
     if place.pad.is_none() {
         lines.push(label(" The vehicle has not reported its pad: no latitude, longitude or KML"));
-    } else if model.settings.here.is_none() {
-        lines.push(label(" The way from here needs this place: `here` in the settings"));
+    } else if model.here().is_none() {
+        lines.push(label(" The way from here needs this place: `position` or `here` in the settings"));
     }
     lines
 }
@@ -305,12 +331,10 @@ fn degrees(at: Option<Degrees>) -> Option<Line<'static>> {
 
 /// The way to a spot, where it is from the pad, and how wrong that may be.
 fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {
-    let way = place.way(spot, model.settings.here);
-    // 359.6 is 000, as on a compass.
-    let bearing_deg = way.bearing_deg.round() as u32 % 360;
+    let way = place.way(spot, model.here());
     let (way_m, north_m, east_m) = (fixed(way.distance_m, 0), fixed(spot.north_m, 1), fixed(spot.east_m, 1));
     let mut lines = vec![
-        theme.line(format!("  {way_m} m, bearing {bearing_deg:03} deg"), TextRole::Title),
+        theme.line(format!("  {way_m} m, bearing {} deg", way.compass()), TextRole::Title),
         Line::from(format!("  north {north_m} m, east {east_m} m")),
         Line::from(theme.either_side(&format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0)))),
     ];

@@ -10,8 +10,8 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use crate::model::{
-    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, field, hold_words, is_on_pad, link_hints, why_not_here,
-    why_untested, words,
+    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, field, hold_words, is_on_pad, link_hints,
+    why_not_here, why_untested, words,
 };
 use crate::view::band::{Item, Room, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
