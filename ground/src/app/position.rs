@@ -105,7 +105,7 @@ impl Locator {
                     {
                         self.transport = again;
                     }
-                    Some(Err("sends neither gpsd's TPV nor NMEA's GGA: is the baud rate right?".to_owned()))
+                    Some(Err("no position for 10 s, neither gpsd's TPV nor NMEA's GGA".to_owned()))
                 }
             };
             let now = Instant::now();

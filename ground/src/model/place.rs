@@ -23,7 +23,7 @@ pub struct Spot {
     pub north_m: f64,
     pub east_m: f64,
     /// The radius around it in which it may be, m; of a place where it was or is, in 19 of 20
-    /// cases.
+    /// cases. NaN if it is not known.
     pub error_m: f64,
 }
 
@@ -113,12 +113,12 @@ impl Model {
         let Some((_, Tracker { at, height_m })) = self.chosen_tracker() else {
             return stored.filter(|_| may_have_left(&self.vehicle, now).is_none());
         };
-        let pad = self.vehicle.pad.or(stored?.pad)?;
+        let pad = self.vehicle.pad.or_else(|| stored?.pad)?;
         let (north_m, east_m) = pad.to(at.value);
         Some(LastPlace {
             boot: 0,
             received_unix_s: self.settings.start_unix_s + at.received_at.as_secs(),
-            received: Spot { north_m, east_m, error_m: POSITION_ERROR_M },
+            received: Spot { north_m, east_m, error_m: f64::NAN },
             height_m: *height_m,
             predicted: None,
             pad: Some(pad),

@@ -148,7 +148,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.book = BookState { head: Some(head), is_signed, ..before };
         }
         Msg::Here(Ok(at)) => {
-            if model.here.is_none() || model.here_trouble.take().is_some() {
+            if model.here_trouble.take().is_some() || model.here.is_none() {
                 model.info(now, "own position received");
             }
             model.here = Some(Sample::new(at, now));

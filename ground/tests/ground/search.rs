@@ -95,8 +95,10 @@ fn the_way_is_called_out_every_10_s_on_page_find() {
 #[test]
 fn trouble_of_the_receiver_is_reported_and_the_last_position_stays() {
     let mut rig = landed();
+    rig.msg(Msg::Here(Err("no position for 10 s".to_owned())));
     stands_at(&mut rig, -70.0, 5.0);
     rig.expect_event("own position received");
+    assert!(!rig.screen(80, 24).contains("no position for"));
     rig.msg(Msg::Here(Err("no fix\u{1b}[2J".to_owned())));
     rig.run(30.0);
     rig.expect_event("own position: no fix");
@@ -139,6 +141,21 @@ fn a_second_vehicle_without_a_pad_shows_its_coordinates() {
     rig.run(1.0);
     rig.keys(&[typed("f"), vec![Key::Down]].concat());
     rig.expect_screen("35.347000, -117.809000");
+}
+
+/// A vehicle that may be in the air does not hide the booster's tracker.
+#[test]
+fn a_second_vehicle_is_found_while_the_first_may_be_in_the_air() {
+    let mut rig = crate::screens::counting();
+    rig.receive(&home());
+    rig.receive_from(TRACKER, &at(PAD.moved(0.0, 60.0)));
+    rig.speaks = false;
+    rig.run(12.0);
+    rig.key(Key::Char('f'));
+    rig.expect_screen("MAY BE IN THE AIR since T-0");
+    rig.expect_screen("also system 7, 12 s ago");
+    rig.key(Key::Down);
+    rig.expect_screen("60 m, bearing 090 deg");
 }
 
 /// Its frames look like the vehicle's in everything but the system id.

@@ -249,41 +249,28 @@ fn draw_arrow(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
     });
 }
 
-/// The positions and the ways to them.
-pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    let mut lines = sought_lines(model, theme, now);
-    if let Some(here) = model.here {
-        let role = if here.age(now) > OWN_POSITION_OLD { TextRole::Caution } else { TextRole::Plain };
-        lines.push(theme.line(format!("  own position {} s ago", here.age(now).as_secs()), role));
-    }
-    let trouble = model.here_trouble.as_ref();
-    lines.extend(trouble.map(|why| theme.line(format!("  own position: {why}"), TextRole::Caution)));
-    let shown = model.pages.tracker.filter(|_| model.sought(now).is_some());
-    for (id, tracker) in model.trackers.iter().filter(|(id, _)| shown != Some(**id)) {
-        let age_s = tracker.at.age(now).as_secs();
-        lines.push(theme.line(format!(" also system {id}, {age_s} s ago (Up, Down)"), TextRole::Title));
-        lines.extend(degrees(Some(tracker.at.value)));
-    }
-    lines
-}
-
 /// The position to look for, and the way there.
-fn sought_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let label = |words: &'static str| theme.line(words, TextRole::Label);
-    let tracker = model.chosen_tracker().map(|(id, _)| id);
-    if tracker.is_none() && may_have_left(&model.vehicle, now).is_some() {
-        return may_have_left_lines(model, theme);
-    }
+    let tracker = model.chosen_tracker();
+    let title = tracker.map_or_else(|| " Last received".to_owned(), |(id, _)| format!(" SYSTEM {id}"));
     let Some(place) = model.sought(now) else {
-        return vec![if model.vehicle.left_pad_at.is_some() {
-            theme.line(" The vehicle has left the pad, and has not reported its position.", TextRole::Caution)
-        } else if tracker.is_some() {
-            label(" The way needs the position of the pad.")
-        } else {
-            label(
+        let mut lines = match tracker {
+            Some((_, tracker)) => {
+                let at = degrees(Some(tracker.at.value));
+                std::iter::once(theme.line(title, TextRole::Title)).chain(at).collect()
+            }
+            None if may_have_left(&model.vehicle, now).is_some() => may_have_left_lines(model, theme),
+            None if model.vehicle.left_pad_at.is_some() => {
+                let words = " The vehicle has left the pad, and has not reported its position.";
+                vec![theme.line(words, TextRole::Caution)]
+            }
+            None => vec![label(
                 " The vehicle has not left the pad. In flight its last place is kept beside the log, for maps.",
-            )
-        }];
+            )],
+        };
+        lines.extend(beside_lines(model, theme, now));
+        return lines;
     };
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
     let mut lines = Vec::new();
@@ -292,11 +279,11 @@ fn sought_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         lines.extend(spot(model, &place, predicted, theme));
     }
     let from = if place.way(&place.received, model.here()).from_station { "here" } else { "the pad" };
-    let what = tracker.map_or_else(|| "Last received".to_owned(), |id| format!("SYSTEM {id}"));
-    lines.push(theme.line(format!(" {what}, from {from}"), TextRole::Title));
+    lines.push(theme.line(format!("{title}, from {from}"), TextRole::Title));
     lines.extend(spot(model, &place, &place.received, theme));
     let ago = now_unix_s.saturating_sub(place.received_unix_s);
     lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
+    lines.extend(beside_lines(model, theme, now));
     if tracker.is_none() {
         lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
         lines.push(supply(model, theme));
@@ -305,6 +292,22 @@ fn sought_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>
         lines.push(label(" The vehicle has not reported its pad: no latitude, longitude or KML"));
     } else if model.here().is_none() {
         lines.push(label(" The way from here needs this place: `position` or `here` in the settings"));
+    }
+    lines
+}
+
+/// The age of the station's own position, and the other vehicles.
+fn beside_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let own = model.here.map(|here| {
+        let role = if here.age(now) > OWN_POSITION_OLD { TextRole::Caution } else { TextRole::Plain };
+        theme.line(format!("  own position {} s ago", here.age(now).as_secs()), role)
+    });
+    let trouble = model.here_trouble.as_ref();
+    let trouble = trouble.map(|why| theme.line(format!("  own position: {why}"), TextRole::Caution));
+    let mut lines: Vec<Line> = own.into_iter().chain(trouble).collect();
+    for (id, tracker) in model.trackers.iter().filter(|(id, _)| model.pages.tracker != Some(**id)) {
+        let age_s = tracker.at.age(now).as_secs();
+        lines.push(theme.line(format!(" also system {id}, {age_s} s ago (Up, Down)"), TextRole::Title));
     }
     lines
 }
@@ -336,8 +339,11 @@ fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line
     let mut lines = vec![
         theme.line(format!("  {way_m} m, bearing {} deg", way.compass()), TextRole::Title),
         Line::from(format!("  north {north_m} m, east {east_m} m")),
-        Line::from(theme.either_side(&format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0)))),
     ];
+    if spot.error_m.is_finite() {
+        let words = format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0));
+        lines.push(Line::from(theme.either_side(&words)));
+    }
     let [distances, _] = field::distances(model, (spot.east_m, spot.north_m));
     lines.extend((!distances.is_empty()).then(|| Line::from(format!("  {distances}"))));
     lines.extend(degrees(place.degrees(spot)));
