@@ -11,6 +11,7 @@ mod first_flight;
 mod ground_log;
 mod hold;
 mod hostile;
+mod launch_day;
 mod links;
 mod logs;
 mod outside_clients;

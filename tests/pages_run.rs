@@ -1,7 +1,7 @@
 //! The commands of the pages run as they stand: each line of a page's blocks, one after the other,
 //! in one folder, as somebody pastes them; and what it says is what the page says.
-//! [`crate::first_flight`] and [`crate::crew`] run the two pages whose programs wait for each other
-//! and for keys.
+//! [`crate::first_flight`], [`crate::launch_day`] and [`crate::crew`] run the pages whose programs
+//! wait for each other and for keys.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -105,7 +105,7 @@ const COMMANDS: [(&str, &str); 21] = [
 ];
 
 /// The lines of a page's blocks that hold commands, without the languages of other programs.
-fn lines_of_commands(page: &str) -> Vec<&str> {
+pub(crate) fn lines_of_commands(page: &str) -> Vec<&str> {
     let mut found = Vec::new();
     let mut lines = page.lines();
     while let Some(line) = lines.by_ref().find(|line| line.starts_with("```")) {
@@ -134,20 +134,25 @@ fn has_answered(line: &str, code: Option<i32>) -> bool {
     }
 }
 
-fn root() -> PathBuf {
+pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Runs a line in the folder as a user's shell with our programs in its path does; says what was
-/// wrong.
-fn run_line(folder: &Path, line: &str) -> Option<String> {
+/// A line for a user's shell in the folder, with our programs in its path.
+pub(crate) fn in_shell(folder: &Path, line: &str) -> Command {
     let ours = Path::new(program(Program::Replay).get_program()).parent().expect("a folder").to_owned();
     let theirs = std::env::var_os("PATH").unwrap_or_default();
     let path =
         std::env::join_paths([ours].into_iter().chain(std::env::split_paths(&theirs))).expect("a path");
     let mut shell = Command::new("bash");
     shell.args(["-c", line]).env("PATH", &path).env("HOME", folder).env_remove("RUST_BACKTRACE");
-    let ended = Running::to_end(shell.current_dir(folder));
+    shell.current_dir(folder);
+    shell
+}
+
+/// Runs a line; says what was wrong.
+fn run_line(folder: &Path, line: &str) -> Option<String> {
+    let ended = Running::to_end(&mut in_shell(folder, line));
     // The longest beginning is this line's.
     let found = COMMANDS.iter().filter(|(begin, _)| format!("{line} ").starts_with(begin));
     let found = found.max_by_key(|(begin, _)| begin.len());

@@ -9,7 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use protocol::dialect::TdPhase;
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::program::{EXIT_CODES, Manual, Shown, in_range};
-use protocol::transport::LinkAddress;
+use protocol::transport::{LinkAddress, LinkAddressError};
 use serde::Deserialize;
 use sim::wire::fly::{Speed, StartPoint};
 
@@ -154,6 +154,11 @@ pub struct Flags {
     /// one.
     #[arg(long, value_name = "FILE", help_heading = "Station")]
     pub checklist: Option<PathBuf>,
+
+    /// This station's own position, for the way to a lost vehicle: gpsd://HOST:PORT, or a receiver
+    /// that sends NMEA 0183 over serial:DEVICE:BAUD, tcpout:HOST:PORT or udpin:ADDRESS:PORT.
+    #[arg(long, value_name = "SOURCE", help_heading = "Station")]
+    pub position: Option<PositionSource>,
 
     /// Log to write (MCAP), or `none`. An existing file is kept: the log then gets the next free
     /// name, and says so.
@@ -324,6 +329,26 @@ impl StationArgs {
 }
 
 // The values that flags take, and how their text is parsed.
+
+/// The source of the station's own position.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PositionSource {
+    pub link: LinkAddress,
+    /// It is queried for its reports, as gpsd expects.
+    pub is_gpsd: bool,
+}
+
+impl FromStr for PositionSource {
+    type Err = String;
+
+    fn from_str(given: &str) -> Result<Self, String> {
+        let gpsd = given.strip_prefix("gpsd://").map(|host| format!("tcpout:{host}"));
+        let link = gpsd.as_deref().unwrap_or(given).parse();
+        let accepted = "gpsd://HOST:PORT, serial:DEVICE:BAUD, tcpout:HOST:PORT or udpin:ADDRESS:PORT";
+        let wrong = |_: LinkAddressError| format!("`{given}` is no source of positions; give {accepted}");
+        Ok(Self { link: link.map_err(wrong)?, is_gpsd: gpsd.is_some() })
+    }
+}
 
 /// Where the log goes.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -127,7 +127,7 @@ impl Config {
             flags
         } else {
             let link = LinkArgs { connect: Vec::new(), key: None, crew: None, ..flags.link };
-            Flags { link, mission: None, checklist: None, forward: Vec::new(), ..flags }
+            Flags { link, mission: None, checklist: None, position: None, forward: Vec::new(), ..flags }
         };
         Ok(station.flags.update_from_arg_matches(given)?)
     }
@@ -221,7 +221,13 @@ mod tests {
     #[test]
     fn a_flag_overrides_the_key_of_its_name() {
         let (connect, forward) = ("udpin:0.0.0.0:2", "udpout:10.0.0.9:3");
-        let others = [("connect", connect), ("forward", forward), ("sysid", "4"), ("vehicle_sysid", "5")];
+        let others = [
+            ("connect", connect),
+            ("forward", forward),
+            ("sysid", "4"),
+            ("vehicle_sysid", "5"),
+            ("position", "serial:/dev/ttyACM0:9600"),
+        ];
         for argument in Flags::command().get_arguments() {
             let (key, flag) = (argument.get_id().as_str(), format!("--{}", argument.get_long().unwrap()));
             let other = others.iter().find(|(name, _)| *name == key).map_or("other", |(_, other)| other);

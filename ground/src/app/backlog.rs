@@ -92,7 +92,12 @@ impl Older {
         // A message that cannot be decoded was of no use to any screen.
         let Ok((ToScreen::Msg(msg), at)) = decode_to_screen(message) else { return };
         match &msg {
-            Msg::Tick | Msg::Received { .. } | Msg::Sent { .. } | Msg::Links { .. } | Msg::OverLink(_) => {}
+            Msg::Tick
+            | Msg::Received { .. }
+            | Msg::Sent { .. }
+            | Msg::Links { .. }
+            | Msg::OverLink(_)
+            | Msg::Here(_) => {}
             Msg::Frame(frame) if !self.is_event(frame) => {
                 let source = frame.source();
                 let key = (source.system_id, source.component_id, frame.message_id());

@@ -11,6 +11,7 @@ pub mod files;
 mod next_log;
 pub mod output;
 pub mod pace;
+mod position;
 pub mod programs;
 pub mod replaying;
 pub mod screen;
@@ -28,6 +29,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use clap::{ArgMatches, ColorChoice, CommandFactory as _, FromArgMatches as _};
+use futures_util::future::OptionFuture;
 use protocol::book::BookKey;
 use protocol::crew_file::CrewFile;
 use protocol::dialect::TdRole;
@@ -37,7 +39,8 @@ use protocol::log::writer::LogHeader;
 use protocol::mission::MissionHash;
 use protocol::signing::Signing;
 use protocol::transport::LinkAddress;
-use sim::wire::field::{RUN_FACT, field_of};
+use sim::recipe::Recipe;
+use sim::wire::field::{PAD_FACT, RUN_FACT, field_of, pad_of};
 use sim::wire::fly::load_flight;
 
 use crate::attach::OPERATOR_MAX;
@@ -46,7 +49,7 @@ use crate::config::{Config, EXAMPLE, usual_path};
 use crate::demo::{Demo, DemoOptions, LogClock};
 use crate::exit;
 use crate::exit::Exit;
-use crate::model::{Danger, KeyOwner, Model, Role, Seat, Settings, Unfinished, words::printable};
+use crate::model::{Danger, Degrees, KeyOwner, Model, Role, Seat, Settings, Unfinished, words::printable};
 use crate::update::update;
 use crate::view::theme::Palette;
 use attached::Viewer;
@@ -55,6 +58,7 @@ use clock::{Clock, LogTime};
 use files::{LogGuard, LogWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
 use next_log::NextLog;
 use output::{Lines, Output, print};
+use position::Locator;
 use server::{Server, hello};
 use station::{Answers, Station};
 use wire::Wire;
@@ -148,11 +152,12 @@ pub fn run(given: &ArgMatches) -> anyhow::Result<Exit> {
     }
 }
 
-/// The fact about a run with the text of the mission's field.
-fn field_fact(args: &StationArgs) -> anyhow::Result<BTreeMap<String, String>> {
-    let mission = args.flags.mission.as_deref().map(load_flight).transpose()?;
-    let field = mission.and_then(|mission| mission.recipe.field);
-    Ok(field.map(|text| (RUN_FACT.to_owned(), text)).into_iter().collect())
+/// The facts about a run with the text of the mission's field, and the position of its pad.
+fn field_facts(recipe: &Recipe) -> BTreeMap<String, String> {
+    let Degrees { latitude, longitude } = pad_of(&recipe.mission);
+    let pad = format!("{latitude},{longitude}");
+    let facts = recipe.field.clone().map(|text| [(RUN_FACT, text), (PAD_FACT, pad)]);
+    facts.into_iter().flatten().map(|(fact, text)| (fact.to_owned(), text)).collect()
 }
 
 async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Result<Exit> {
@@ -161,11 +166,14 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
         [] => Some(DemoOptions::load(args)?),
         _ => None,
     };
+    // A demonstration flies this mission, so it cannot fly another.
+    let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
+    let mission = named.map(load_flight).transpose()?.map(|flight| flight.recipe);
     let header = match &demo_options {
         // It contains both sides.
         Some(options) => options.flight.log_header("ground", clock.start_unix_ns()),
         None => LogHeader {
-            run: field_fact(args)?,
+            run: mission.as_ref().map(field_facts).unwrap_or_default(),
             writer: "ground".to_owned(),
             start_unix_ns: clock.start_unix_ns(),
             ..LogHeader::default()
@@ -174,13 +182,14 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, Arc::clone(&log_guard.0));
-    let mut station = match Box::pin(start(args, config, duty, (clock, demo_options), next_log)).await {
-        Ok(station) => station,
-        Err(error) => {
-            log_guard.discard();
-            return Err(error);
-        }
-    };
+    let mut station =
+        match Box::pin(start(args, config, duty, (clock, demo_options, mission), next_log)).await {
+            Ok(station) => station,
+            Err(error) => {
+                log_guard.discard();
+                return Err(error);
+            }
+        };
     if duty.is_daemon {
         print(output::greeting(&station.model).as_bytes())?;
     }
@@ -208,7 +217,7 @@ async fn start(
     args: &StationArgs,
     config: &Config,
     duty: Duty,
-    (clock, demo_options): (Clock, Option<DemoOptions>),
+    (clock, demo_options, mission): (Clock, Option<DemoOptions>, Option<Recipe>),
     mut next_log: NextLog,
 ) -> anyhow::Result<Station> {
     let Duty { is_daemon, interactive, time_limit, json } = duty;
@@ -224,11 +233,8 @@ async fn start(
     let start_unix_s = clock.start_unix_ns() / 1_000_000_000;
     let checklist =
         args.flags.checklist.as_deref().map(|path| open_checklist(path, start_unix_s)).transpose()?;
-    // A demonstration flies this mission, so it cannot fly another.
-    let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
-    let mission = named.map(load_flight).transpose()?;
     let recipe = demo_options.as_ref().map(|demo| &demo.flight.recipe);
-    let field = recipe.or(mission.as_ref().map(|mission| &mission.recipe)).and_then(field_of);
+    let field = recipe.or(mission.as_ref()).and_then(field_of);
     let vehicle_clock = demo_options.as_ref().map(|_| LogClock::new());
     let log_time = vehicle_clock.clone().map_or(LogTime::Run(clock), LogTime::Vehicle);
     let opened =
@@ -240,6 +246,7 @@ async fn start(
         Demo::start(options, wire.endpoints().next(), recorder.clone(), vehicle_clock)
     });
     let demo = demo.transpose().context("starting the simulator")?;
+    let locator = OptionFuture::from(args.flags.position.clone().map(Locator::open)).await.transpose()?;
     let auto = if is_daemon { args.auto } else { args.starts_by_itself(interactive) };
     let links: Vec<String> = wire.endpoints().map(LinkAddress::to_string).collect();
     let mut model = Model::new(Settings {
@@ -259,7 +266,7 @@ async fn start(
         },
         key_owner: owner,
         start: args.start.filter(|_| mission.is_some()).map(|start| start.name().to_owned()),
-        mission: mission.map(|mission| MissionHash::of(&mission.recipe.mission_toml)),
+        mission: mission.map(|mission| MissionHash::of(&mission.mission_toml)),
         crew_roles: roles,
         here: config.here,
         field,
@@ -294,6 +301,7 @@ async fn start(
         background: Background::start("files").context("starting the thread of the files")?,
         log_watch: LogWatch::default(),
         demo,
+        locator,
         output,
         socket: args.flags.socket.socket.clone(),
         server,

@@ -192,7 +192,7 @@ mod tests {
             let duty = Duty { is_daemon: true, interactive: false, time_limit: None, json: false };
             let next_log = NextLog::new(&args, header, std::sync::Arc::clone(&guard.0));
             let config = Config::default();
-            let started = Box::pin(start(&args, &config, duty, (clock, None), next_log)).await;
+            let started = Box::pin(start(&args, &config, duty, (clock, None, None), next_log)).await;
             let mut station = started.unwrap();
             let say = |station: &mut Station| {
                 for _ in 0..3 {

@@ -141,7 +141,12 @@ impl Pace {
     pub fn mark_message(&mut self, msg: &Msg, model: &Model) {
         match msg {
             // These change nothing that must be drawn within the next second.
-            Msg::Tick | Msg::Sent { .. } | Msg::Links { .. } | Msg::OverLink(_) | Msg::FromSource(_) => {}
+            Msg::Tick
+            | Msg::Sent { .. }
+            | Msg::Links { .. }
+            | Msg::OverLink(_)
+            | Msg::FromSource(_)
+            | Msg::Here(_) => {}
             Msg::Frame(_) | Msg::Received { .. }
                 if model.vehicle.in_flight() || model.vehicle.counts_down() =>
             {

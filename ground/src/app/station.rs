@@ -19,6 +19,7 @@ use super::clock::{Clock, LogTime, Signals};
 use super::files::{LogFiles, LogWatch, SignatureFile, StationBook};
 use super::next_log::NextLog;
 use super::output::{Lines, Output};
+use super::position::Locator;
 use super::server::{Server, ServerEvent, hello};
 use super::wire::Wire;
 use super::{files, programs, screen, stations};
@@ -43,6 +44,8 @@ pub(super) struct Station {
     pub(super) background: Background,
     pub(super) log_watch: LogWatch,
     pub(super) demo: Option<Demo>,
+    /// The receiver of the station's own position.
+    pub(super) locator: Option<Locator>,
     pub(super) output: Output,
     /// The socket path that was given, if any.
     pub(super) socket: Option<PathBuf>,
@@ -123,7 +126,7 @@ impl Station {
         self.report_crew();
         loop {
             let redraw_at = self.output.redraw_at();
-            let (demo, server) = (&mut self.demo, &mut self.server);
+            let (demo, server, locator) = (&mut self.demo, &mut self.server, &mut self.locator);
             let wakes_at = self.model.wakes_at();
             let msgs = tokio::select! {
                 // The order matters. Keys come before the clock, because a waiting key may show
@@ -145,6 +148,7 @@ impl Station {
                     self.tick_msgs()
                 }
                 () = self.clock.sleep_until(redraw_at) => Vec::new(),
+                Some(msg) = OptionFuture::from(locator.as_mut().map(Locator::next)) => vec![msg],
                 received = self.wire.receive() => self.wire.take(received),
             };
             let mut next = Next::Go;

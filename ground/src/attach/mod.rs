@@ -17,7 +17,7 @@ use crate::update::Msg;
 // What a station and its screens say to each other.
 
 /// The version of the encoding. A program of another version is refused with an explanation.
-pub const VERSION: u32 = 16;
+pub const VERSION: u32 = 17;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 

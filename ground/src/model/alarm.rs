@@ -255,6 +255,7 @@ pub struct Called {
     pub(crate) phase: Option<TdPhase>,
     pub(crate) height_m: Option<f64>,
     pub(crate) height_at: Option<Duration>,
+    pub(crate) way_at: Option<Duration>,
     /// The last callout of each other row.
     pub(crate) rows: [Option<String>; 5],
     pub(crate) bells_left: u8,

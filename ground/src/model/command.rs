@@ -11,7 +11,7 @@ use strum::VariantArray;
 
 use super::{
     EXPIRES_AFTER, FlownMission, LinkState, Model, PadCheck, Prompt, Proposal, RED_AFTER, Seat, Settings,
-    Vehicle, foreign_name, is_on_pad, words,
+    Vehicle, field, foreign_name, is_on_pad, words,
 };
 
 /// The effect of an accepted command should show in the vehicle's state within this time: a little
@@ -292,6 +292,7 @@ pub fn why_not_arm(model: &Model, now: Duration) -> Option<String> {
         })
         .or_else(|| why_no_key(model))
         .or_else(|| why_other_mission(model))
+        .or_else(|| field::crowd_inside_fence(model))
         .or_else(|| model.why_checklist(now))
         .or_else(|| why_not_in(model, is_on_pad))
         // Last: the crew can overrule these two, each by its word.
@@ -307,6 +308,7 @@ pub fn why_no_go(model: &Model, now: Duration) -> Option<String> {
         .or_else(|| model.vehicle.why_no_go())
         .or_else(|| (!model.link.uplink.is_proven(now)).then(uplink))
         .or_else(|| why_other_mission(model))
+        .or_else(|| field::crowd_inside_fence(model))
         .or_else(|| model.why_checklist(now))
         .or_else(|| why_untested(model))
         .or_else(|| model.why_no_log(now))

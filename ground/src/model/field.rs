@@ -29,11 +29,15 @@ pub(crate) fn distances(model: &Model, (east_m, north_m): (f64, f64)) -> [String
     [field.distances(pad, (north_m, east_m)), crowd.unwrap_or_default()]
 }
 
+/// Distance of the crowd line from the pad, and the radius of the fence of the mission, m.
+pub(crate) fn crowd_and_fence_m(model: &Model) -> Option<(f64, f64)> {
+    let (field, pad) = around(model)?;
+    field.nearest_m(Kind::CrowdLine, pad, (0.0, 0.0)).zip(model.vehicle.fence_m())
+}
+
 /// A crowd line that crosses the fence of the mission: the vehicle may land among people.
 pub(crate) fn crowd_inside_fence(model: &Model) -> Option<String> {
-    let (field, pad) = around(model)?;
-    let crowd_m = field.nearest_m(Kind::CrowdLine, pad, (0.0, 0.0))?;
-    let fence_m = model.vehicle.fence_m().filter(|fence_m| crowd_m < *fence_m)?;
+    let (crowd_m, fence_m) = crowd_and_fence_m(model).filter(|(crowd_m, fence_m)| crowd_m < fence_m)?;
     Some(format!("CROWD LINE INSIDE THE FENCE: {crowd_m:.0} m of {fence_m:.0} m from the pad"))
 }
 

@@ -98,8 +98,7 @@ pub struct Settings {
     /// The people of the crew file by name, with their roles; empty without one.
     #[serde(skip)]
     pub crew_roles: Vec<(String, TdRole)>,
-    /// The station's position on the Earth; `None` if not given.
-    #[serde(skip)]
+    /// The station's position on the Earth without a receiver; `None` if not given.
     pub here: Option<Degrees>,
     /// The lines of the field around the pad, if the mission names any.
     pub field: Option<Field>,
@@ -227,6 +226,11 @@ pub struct Model {
     pub(crate) sign_refused: Option<(String, Duration)>,
     /// The last position of the vehicle: of this flight, or stored before a restart.
     pub place: Option<LastPlace>,
+    /// The station's own position by its receiver, and why that reports none now.
+    pub(crate) here: Option<Sample<Degrees>>,
+    pub(crate) here_trouble: Option<String>,
+    /// The other vehicles on the link that report their positions, by their system ids.
+    pub(crate) trackers: BTreeMap<u8, Tracker>,
     /// An unconfirmed abort of an earlier run of this station, or of its screen.
     pub(crate) abort_before: Option<String>,
     /// When a screen that commands nothing was last given a command.

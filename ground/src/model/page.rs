@@ -84,6 +84,8 @@ pub struct Pages {
     pub checklist: bool,
     /// The chosen step of the checklist; `None` for the first that is open.
     pub step: Option<usize>,
+    /// The system id of the tracker whose position page Find shows; `None` for the vehicle.
+    pub tracker: Option<u8>,
     /// A text that is being typed.
     pub entry: Option<TextEntry>,
     /// The letters of a word that have been typed and not recorded yet.

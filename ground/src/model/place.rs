@@ -7,12 +7,15 @@ use protocol::dialect::ESTIMATOR_STATUS_DATA;
 pub use protocol::motion::Degrees;
 use serde::{Deserialize, Serialize};
 
-use super::dead_reckoning::{POSITION_ERROR_M, predict_position};
+use super::dead_reckoning::{POSITION_ERROR_M, may_have_left, predict_position};
 use super::{Model, Sample};
 
 /// Radius around a position that holds it in 19 of 20 cases, in standard deviations of each axis:
 /// sqrt(-2 ln 0.05).
 const WITHIN_95: f64 = 2.45;
+
+/// Age from which the station's own position is not current: a receiver sends one a second.
+pub(crate) const OWN_POSITION_OLD: Duration = Duration::from_secs(10);
 
 /// A position over the ground, from the pad, with its error.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
@@ -20,7 +23,7 @@ pub struct Spot {
     pub north_m: f64,
     pub east_m: f64,
     /// The radius around it in which it may be, m; of a place where it was or is, in 19 of 20
-    /// cases.
+    /// cases. NaN if it is not known.
     pub error_m: f64,
 }
 
@@ -50,6 +53,13 @@ pub struct Way {
     pub from_station: bool,
 }
 
+impl Way {
+    /// The bearing in whole degrees of three digits; 359.6 is 000, as on a compass.
+    pub fn compass(&self) -> String {
+        format!("{:03}", self.bearing_deg.round() as u32 % 360)
+    }
+}
+
 impl LastPlace {
     /// Where to look first.
     pub fn best(&self) -> Spot {
@@ -77,7 +87,44 @@ impl LastPlace {
     }
 }
 
+/// Another vehicle that reports its position, as the booster's tracker does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tracker {
+    pub(crate) at: Sample<Degrees>,
+    /// Height above where it was switched on, m.
+    pub(crate) height_m: f64,
+}
+
 impl Model {
+    /// The station's own position: by its receiver, otherwise by its settings.
+    pub fn here(&self) -> Option<Degrees> {
+        self.here.map(|here| here.value).or(self.settings.here)
+    }
+
+    /// The tracker that the crew looks for; `None` for the vehicle.
+    pub(crate) fn chosen_tracker(&self) -> Option<(u8, &Tracker)> {
+        let id = self.pages.tracker?;
+        self.trackers.get(&id).map(|tracker| (id, tracker))
+    }
+
+    /// The position to look for: of the chosen tracker, otherwise of the vehicle.
+    pub(crate) fn sought(&self, now: Duration) -> Option<LastPlace> {
+        let stored = self.last_place(now).or(self.place);
+        let Some((_, Tracker { at, height_m })) = self.chosen_tracker() else {
+            return stored.filter(|_| may_have_left(&self.vehicle, now).is_none());
+        };
+        let pad = self.vehicle.pad.or_else(|| stored?.pad)?;
+        let (north_m, east_m) = pad.to(at.value);
+        Some(LastPlace {
+            boot: 0,
+            received_unix_s: self.settings.start_unix_s + at.received_at.as_secs(),
+            received: Spot { north_m, east_m, error_m: f64::NAN },
+            height_m: *height_m,
+            predicted: None,
+            pad: Some(pad),
+        })
+    }
+
     /// The vehicle's last position in this flight; `None` before it left the pad.
     pub fn last_place(&self, now: Duration) -> Option<LastPlace> {
         let left_at = self.vehicle.left_pad_at?;

@@ -41,7 +41,8 @@ pub struct Player {
 impl Player {
     /// Starts at the beginning, running.
     pub fn new(recording: Recording, settings: Settings) -> Self {
-        let settings = Settings { vehicle: recording.vehicle.unwrap_or(settings.vehicle), ..settings };
+        let vehicle = recording.vehicle.unwrap_or(settings.vehicle);
+        let settings = Settings { vehicle, field: recording.field.clone(), ..settings };
         let (length, phases) = (recording.length, Arc::clone(&recording.phases));
         let mut player = Self {
             model: Model::new(settings.clone()),

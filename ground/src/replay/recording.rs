@@ -10,15 +10,20 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::dialect::{MavMessage, TdPhase};
+use mavlink::MessageData as _;
+use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TdPhase};
+use protocol::field::Field;
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
 use protocol::log::reader::{LogItem, LogReader};
-use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
+use protocol::log::record::{METADATA_RUN, TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
+use protocol::motion::Degrees;
+use sim::wire::field::RUN_FACT;
 
 use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
+use crate::update::frames::GLOBAL_POSITION_ID;
 
 /// A larger step back in time means that the clock was set back, not that frames of two links are
 /// out of order. An MCAP log has none.
@@ -44,6 +49,8 @@ pub struct Recording {
     pub damage: Option<String>,
     /// The shown vehicle: the chosen one, otherwise the first received one.
     pub vehicle: Option<Address>,
+    /// The field around the pad, if the log has one.
+    pub field: Option<Field>,
 }
 
 impl Recording {
@@ -57,10 +64,15 @@ impl Recording {
         let reading = || format!("cannot read {shown}");
         let file = File::open(path).with_context(reading)?;
         let mut events = LogEvents::begin(&file, vehicle).with_context(reading)?;
+        let given = vehicle;
         let (mut ground, mut vehicle) = (Survey::default(), Survey::default());
         while let Some((side, at, event)) = events.next_event().with_context(reading)? {
             let survey = if side == Side::Ground { &mut ground } else { &mut vehicle };
             survey.note(at, &event);
+        }
+        // Another system may have been received before the vehicle.
+        if let Some(ours) = events.ours.filter(|ours| given.is_none() && events.vehicle != Some(*ours)) {
+            return Self::load(path, Some(ours));
         }
         // What the ground received; if that is missing, what the vehicle sent.
         let found = [(Side::Ground, ground), (Side::Vehicle, vehicle)];
@@ -78,9 +90,10 @@ impl Recording {
             };
             anyhow::bail!("{shown}: {why}");
         };
-        let Survey { events: count, length, phases, .. } = survey;
+        let Survey { events: count, length, phases, pad, .. } = survey;
         let (damage, vehicle) = (events.damage(), events.vehicle);
-        Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
+        let field = events.field.zip(pad).and_then(|(text, pad)| Field::parse(&text, pad, RUN_FACT).ok());
+        Ok(Self { damage, vehicle, field, file, side, events: count, length, phases: phases.into() })
     }
 
     /// A reader at the first event.
@@ -106,6 +119,7 @@ struct Survey {
     has_vehicle: bool,
     length: Duration,
     phases: Vec<(TdPhase, Duration)>,
+    pad: Option<Degrees>,
 }
 
 impl Survey {
@@ -114,7 +128,16 @@ impl Survey {
         self.events += 1;
         if let Msg::Frame(frame) = event {
             self.has_vehicle = true;
-            if let Some(phase) = phase_of(frame)
+            let phase = match frame.decode() {
+                Ok(MavMessage::HEARTBEAT(data)) => phase_of_heartbeat(&data),
+                Ok(MavMessage::TD_FLIGHT_STATUS(data)) => Some(data.phase),
+                Ok(MavMessage::HOME_POSITION(data)) => {
+                    self.pad = Degrees::of_e7(data.latitude, data.longitude).or(self.pad);
+                    None
+                }
+                _ => None,
+            };
+            if let Some(phase) = phase
                 && self.phases.last().is_none_or(|(last, _)| *last != phase)
                 && self.phases.len() < PHASES_MAX
             {
@@ -149,14 +172,6 @@ impl RecordingClock {
     }
 }
 
-fn phase_of(frame: &Frame) -> Option<TdPhase> {
-    match frame.decode().ok()? {
-        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(&data),
-        MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
-        _ => None,
-    }
-}
-
 // Reads the frames of a log as events, one at a time in file order, with bounded memory.
 
 /// The size of the read buffer: some thousand frames.
@@ -181,6 +196,10 @@ struct LogEvents {
     latest_ns: u64,
     /// What the last record holds.
     waiting: VecDeque<(Side, Duration, Msg)>,
+    /// The text of the field in the facts about the run.
+    field: Option<String>,
+    /// The first sender of a flight status.
+    ours: Option<Address>,
 }
 
 enum Format {
@@ -202,7 +221,16 @@ impl LogEvents {
             Format::Mcap(Box::new(LogReader::new(BufReader::with_capacity(BUFFER_BYTES, file))))
         };
         let clocks = <[RecordingClock; 2]>::default();
-        Ok(Self { format, vehicle, ground: None, clocks, latest_ns: 0, waiting: VecDeque::new() })
+        Ok(Self {
+            format,
+            vehicle,
+            ground: None,
+            clocks,
+            latest_ns: 0,
+            waiting: VecDeque::new(),
+            field: None,
+            ours: None,
+        })
     }
 
     /// Why reading ended early, if it did.
@@ -224,7 +252,14 @@ impl LogEvents {
             let (side, stamp_ns, bytes) = match &mut self.format {
                 Format::Mcap(reader) => {
                     let Some(item) = reader.next_item()? else { return Ok(None) };
-                    let LogItem::Message { channel_id, log_time_ns, data, .. } = item else { continue };
+                    let LogItem::Message { channel_id, log_time_ns, data, .. } = item else {
+                        if let LogItem::Metadata { name, mut entries } = item
+                            && name == METADATA_RUN
+                        {
+                            self.field = entries.remove(RUN_FACT).or(self.field.take());
+                        }
+                        continue;
+                    };
                     let Some(channel) = reader.channel(channel_id) else { continue };
                     let side = match channel.metadata.get("endpoint").map(String::as_str) {
                         _ if ![TOPIC_RAW_RX, TOPIC_RAW_TX].contains(&channel.topic.as_str()) => continue,
@@ -260,12 +295,17 @@ impl LogEvents {
     /// frame of the ground.
     fn event_of(&mut self, frame: Frame) -> Option<Msg> {
         let source = frame.source();
+        if frame.message_id() == TD_FLIGHT_STATUS_DATA::ID {
+            self.ours.get_or_insert(source);
+        }
         if source.component_id == VEHICLE.component_id {
             self.vehicle.get_or_insert(source);
         } else if source.component_id == GROUND.component_id {
             self.ground.get_or_insert(source);
         }
-        if Some(source) == self.vehicle {
+        let is_tracker = frame.message_id() == GLOBAL_POSITION_ID
+            && self.vehicle.is_some_and(|vehicle| vehicle.system_id != source.system_id);
+        if Some(source) == self.vehicle || is_tracker {
             return Some(Msg::Frame(frame));
         }
         (Some(source) == self.ground).then(|| {

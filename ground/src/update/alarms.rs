@@ -10,8 +10,9 @@ use protocol::identity::Address;
 
 use crate::model::{
     Acknowledgement, Action, AlarmKind, Amount, Approach, CommandKind, Condition, Danger, Ending, KeepAway,
-    LinkState, LogStanding, Model, PadCheck, RED_AFTER, Sample, dead_reckoning::may_have_left, field,
-    foreign_name, hold_words, is_on_pad, latch_words, refused_frames, sender_words, why_no_go, words,
+    LinkState, LogStanding, Model, OWN_POSITION_OLD, PadCheck, Page, RED_AFTER, Sample,
+    dead_reckoning::may_have_left, field, foreign_name, hold_words, is_on_pad, latch_words, refused_frames,
+    sender_words, why_no_go, words,
 };
 
 /// An abort without an answer raises an alarm after this time.
@@ -314,6 +315,8 @@ fn fails(model: &Model, check: TdCheck) -> bool {
 const HIGH_STEP_M: f64 = 50.0;
 const LOW_STEP_M: f64 = 10.0;
 const LOW_BELOW_M: f64 = 50.0;
+/// How often the way to a vehicle is called out.
+const WAY_EVERY: Duration = Duration::from_secs(10);
 /// Bells of a callout without a voice: for an event, for an event to watch, for something wrong.
 const EVENT: u8 = 1;
 const WATCH: u8 = 2;
@@ -362,6 +365,7 @@ const CALLOUTS: [(bool, Present); 5] = [
 pub(super) fn call_out(model: &mut Model, now: Duration) {
     call_phase(model);
     call_height(model, now);
+    call_way(model, now);
     for (place, (is_state, present)) in CALLOUTS.into_iter().enumerate() {
         let present = present(model, now);
         let about = present.as_ref().and_then(|(_, words, _)| words.split(':').next()).map(str::to_owned);
@@ -406,6 +410,21 @@ fn call_phase(model: &mut Model) {
     if is_on_pad(phase) {
         model.called.height_m = None;
     }
+}
+
+/// Calls out the way to what page Find shows, while it shows it.
+fn call_way(model: &mut Model, now: Duration) {
+    let waits = model.called.way_at.is_some_and(|at| now.saturating_sub(at) < WAY_EVERY);
+    let Some(here) = model.here.filter(|_| model.page() == Page::Find && !waits) else { return };
+    let Some(place) = model.sought(now).filter(|_| !model.vehicle.in_flight()) else { return };
+    let way = place.way(&place.best(), Some(here.value));
+    let words = if here.age(now) > OWN_POSITION_OLD {
+        format!("own position {} seconds old", here.age(now).as_secs())
+    } else {
+        format!("bearing {}, {:.0} metres", way.compass(), way.distance_m)
+    };
+    model.called.way_at = Some(now);
+    call(model, Amount::Normal, words, 0);
 }
 
 /// Calls out the last step of the height that was passed.

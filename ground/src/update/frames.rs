@@ -12,11 +12,13 @@ use protocol::text::Text;
 
 use super::{commands, pad, vehicle_changes};
 use crate::model::{
-    Action, Model, Role, Speaker, StatusReport, is_busy, may_be_ours, telemetry, time_boot_ms,
+    Action, Degrees, Model, Role, Sample, Speaker, StatusReport, Tracker, is_busy, may_be_ours, telemetry,
+    time_boot_ms,
 };
 
 const HEARTBEAT_ID: u32 = 0;
 const RADIO_STATUS_ID: u32 = 109;
+pub(crate) const GLOBAL_POSITION_ID: u32 = 33;
 /// Maximum age, ms, of a frame by which another station still counts as using our address.
 const SAME_ID_WITHIN_MS: u16 = 5_000;
 /// The vehicle reports a station for 5 s after it has ended. The rest is for the report's latency.
@@ -49,8 +51,25 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
         if model.commands.sender.on_received(now) {
             commands::poll(model, now);
         }
+    } else if frame.message_id() == GLOBAL_POSITION_ID
+        && frame.source().system_id != model.settings.vehicle.system_id
+    {
+        note_tracker(model, frame, now);
     } else if frame.message_id() == HEARTBEAT_ID {
         note_stranger(model, frame.source(), now);
+    }
+}
+
+/// Notes the position of another system. It is drawn, and has no other effect.
+fn note_tracker(model: &mut Model, frame: &Frame, now: Duration) {
+    let Ok(MavMessage::GLOBAL_POSITION_INT(data)) = frame.decode() else { return };
+    let (id, at) = (frame.source().system_id, Degrees::of_e7(data.lat, data.lon));
+    let (is_new, has_room) = (!model.trackers.contains_key(&id), model.trackers.len() < STRANGERS_MAX);
+    let Some(at) = at.filter(|_| has_room || !is_new) else { return };
+    let height_m = f64::from(data.relative_alt) * 1e-3;
+    model.trackers.insert(id, Tracker { at: Sample::new(at, now), height_m });
+    if is_new {
+        model.info(now, format!("system {id} reports its position: map and page Find show it"));
     }
 }
 

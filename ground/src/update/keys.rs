@@ -280,6 +280,7 @@ fn on_free_key(model: &mut Model, key: Key, touch: KeyOrigin, now: Duration) {
             let next = beside(model.pages.plotted.place(), key == Key::Up, quantity::COUNT - 1);
             model.pages.plotted = &quantity::ALL[next];
         }
+        Key::Up | Key::Down if shown == Page::Find => choose_tracker(model, key == Key::Up),
         Key::Up => scroll(model, 1),
         Key::Down => scroll(model, -1),
         Key::PageUp => scroll(model, SCROLL_PAGE),
@@ -475,6 +476,14 @@ fn choose_alarm(model: &mut Model, up: bool) {
     if let Some(at) = model.pointed_at() {
         model.pages.chosen = Some(list[beside(at, up, list.len() - 1)].what.kind);
     }
+}
+
+/// Chooses the next or the previous of those to look for: the vehicle, then the trackers.
+fn choose_tracker(model: &mut Model, up: bool) {
+    let ids: Vec<u8> = model.trackers.keys().copied().collect();
+    let at = ids.iter().position(|id| Some(*id) == model.pages.tracker).map_or(0, |at| at + 1);
+    let next = beside(at, up, ids.len());
+    model.pages.tracker = next.checked_sub(1).map(|at| ids[at]);
 }
 
 fn abort(model: &mut Model, now: Duration) {

@@ -21,8 +21,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
-    BookState, Checklist, CommandKind, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role, Seat,
-    Unfinished,
+    BookState, Checklist, CommandKind, Degrees, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role,
+    Sample, Seat, Unfinished,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -83,6 +83,8 @@ pub enum Msg {
     Tick,
     /// The unfinished state of an earlier run of the station, or of its screen.
     Unfinished(Box<Unfinished>),
+    /// The station's own position by its receiver, or why there is none.
+    Here(Result<Degrees, String>),
     // Skipped ones come last: the others are numbered without them.
     /// The keys of one read of the terminal: one if typed by hand, several from a paste, a held key
     /// or a slow line.
@@ -144,6 +146,17 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             let is_another = model.book.head.is_some_and(|signed| signed.head.book != head.head.book);
             let before = if is_another { BookState::default() } else { model.book };
             model.book = BookState { head: Some(head), is_signed, ..before };
+        }
+        Msg::Here(Ok(at)) => {
+            if model.here_trouble.take().is_some() || model.here.is_none() {
+                model.info(now, "own position received");
+            }
+            model.here = Some(Sample::new(at, now));
+        }
+        Msg::Here(Err(why)) => {
+            let why = protocol::text::printable(why.as_bytes());
+            model.warn(now, format!("own position: {why}"));
+            model.here_trouble = Some(why);
         }
         Msg::SignRefused(why) => pad::on_sign_refused(model, protocol::text::printable(why.as_bytes()), now),
         Msg::ScreenTick => keys::pass(model, now),

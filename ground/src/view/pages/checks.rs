@@ -12,8 +12,8 @@ use ratatui::widgets::{Paragraph, Wrap, canvas};
 
 use crate::model::field;
 use crate::model::{
-    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, PadCheck, SURFACES, Sample, Spot, Standing,
-    Way, dead_reckoning::may_have_left, shown, standing, words,
+    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, OWN_POSITION_OLD, PadCheck, SURFACES, Sample,
+    Spot, Standing, Way, dead_reckoning::may_have_left, shown, standing, words,
 };
 use crate::view::band::Room;
 use crate::view::pictures::{Plane, qr};
@@ -204,15 +204,17 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
         (walk, words, right)
     };
     let inside = framed("place", Line::default(), theme, frame, middle);
-    let place = model.last_place(now).or(model.place);
+    let place = model.sought(now);
     let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
     let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
-    match place.filter(|_| may_have_left(&model.vehicle, now).is_none()) {
-        Some(place) => draw_arrow(place.way(&place.best(), model.settings.here), theme, frame, inside),
+    match place {
+        Some(place) => draw_arrow(place.way(&place.best(), model.here()), theme, frame, inside),
         None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
     }
-    let flies = model.vehicle.in_flight() && place.is_some_and(|place| place.predicted.is_none());
+    let flies = model.chosen_tracker().is_none()
+        && model.vehicle.in_flight()
+        && place.is_some_and(|place| place.predicted.is_none());
     let at = place.and_then(|place| place.degrees(&place.best())).filter(|_| !flies && !theme.ascii);
     let of = |rows| at.map_or_else(Vec::new, |at| qr::code(at, rows));
     // Beside large words a small screen has no rows for a border.
@@ -247,20 +249,28 @@ fn draw_arrow(way: Way, theme: Theme, frame: &mut Frame, area: Rect) {
     });
 }
 
-/// The places and the ways to them.
+/// The position to look for, and the way there.
 pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
-    if may_have_left(&model.vehicle, now).is_some() {
-        return may_have_left_lines(model, theme);
-    }
     let label = |words: &'static str| theme.line(words, TextRole::Label);
-    let Some(place) = model.last_place(now).or(model.place) else {
-        return vec![if model.vehicle.left_pad_at.is_some() {
-            theme.line(" The vehicle has left the pad, and has not reported its position.", TextRole::Caution)
-        } else {
-            label(
+    let tracker = model.chosen_tracker();
+    let title = tracker.map_or_else(|| " Last received".to_owned(), |(id, _)| format!(" SYSTEM {id}"));
+    let Some(place) = model.sought(now) else {
+        let mut lines = match tracker {
+            Some((_, tracker)) => {
+                let at = degrees(Some(tracker.at.value));
+                std::iter::once(theme.line(title, TextRole::Title)).chain(at).collect()
+            }
+            None if may_have_left(&model.vehicle, now).is_some() => may_have_left_lines(model, theme),
+            None if model.vehicle.left_pad_at.is_some() => {
+                let words = " The vehicle has left the pad, and has not reported its position.";
+                vec![theme.line(words, TextRole::Caution)]
+            }
+            None => vec![label(
                 " The vehicle has not left the pad. In flight its last place is kept beside the log, for maps.",
-            )
-        }];
+            )],
+        };
+        lines.extend(beside_lines(model, theme, now));
+        return lines;
     };
     let now_unix_s = model.settings.start_unix_s + now.as_secs();
     let mut lines = Vec::new();
@@ -268,17 +278,36 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
         lines.push(theme.line(" PREDICTED: look here first", TextRole::Caution));
         lines.extend(spot(model, &place, predicted, theme));
     }
-    let from = if place.way(&place.received, model.settings.here).from_station { "here" } else { "the pad" };
-    lines.push(theme.line(format!(" Last received, from {from}"), TextRole::Title));
+    let from = if place.way(&place.received, model.here()).from_station { "here" } else { "the pad" };
+    lines.push(theme.line(format!("{title}, from {from}"), TextRole::Title));
     lines.extend(spot(model, &place, &place.received, theme));
     let ago = now_unix_s.saturating_sub(place.received_unix_s);
     lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
-    lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
-    lines.push(supply(model, theme));
+    lines.extend(beside_lines(model, theme, now));
+    if tracker.is_none() {
+        lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));
+        lines.push(supply(model, theme));
+    }
     if place.pad.is_none() {
         lines.push(label(" The vehicle has not reported its pad: no latitude, longitude or KML"));
-    } else if model.settings.here.is_none() {
-        lines.push(label(" The way from here needs this place: `here` in the settings"));
+    } else if model.here().is_none() {
+        lines.push(label(" The way from here needs this place: `position` or `here` in the settings"));
+    }
+    lines
+}
+
+/// The age of the station's own position, and the other vehicles.
+fn beside_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+    let own = model.here.map(|here| {
+        let role = if here.age(now) > OWN_POSITION_OLD { TextRole::Caution } else { TextRole::Plain };
+        theme.line(format!("  own position {} s ago", here.age(now).as_secs()), role)
+    });
+    let trouble = model.here_trouble.as_ref();
+    let trouble = trouble.map(|why| theme.line(format!("  own position: {why}"), TextRole::Caution));
+    let mut lines: Vec<Line> = own.into_iter().chain(trouble).collect();
+    for (id, tracker) in model.trackers.iter().filter(|(id, _)| model.pages.tracker != Some(**id)) {
+        let age_s = tracker.at.age(now).as_secs();
+        lines.push(theme.line(format!(" also system {id}, {age_s} s ago (Up, Down)"), TextRole::Title));
     }
     lines
 }
@@ -305,15 +334,16 @@ fn degrees(at: Option<Degrees>) -> Option<Line<'static>> {
 
 /// The way to a spot, where it is from the pad, and how wrong that may be.
 fn spot(model: &Model, place: &LastPlace, spot: &Spot, theme: Theme) -> Vec<Line<'static>> {
-    let way = place.way(spot, model.settings.here);
-    // 359.6 is 000, as on a compass.
-    let bearing_deg = way.bearing_deg.round() as u32 % 360;
+    let way = place.way(spot, model.here());
     let (way_m, north_m, east_m) = (fixed(way.distance_m, 0), fixed(spot.north_m, 1), fixed(spot.east_m, 1));
     let mut lines = vec![
-        theme.line(format!("  {way_m} m, bearing {bearing_deg:03} deg"), TextRole::Title),
+        theme.line(format!("  {way_m} m, bearing {} deg", way.compass()), TextRole::Title),
         Line::from(format!("  north {north_m} m, east {east_m} m")),
-        Line::from(theme.either_side(&format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0)))),
     ];
+    if spot.error_m.is_finite() {
+        let words = format!("  ±{} m in 19 of 20 cases", fixed(spot.error_m, 0));
+        lines.push(Line::from(theme.either_side(&words)));
+    }
     let [distances, _] = field::distances(model, (spot.east_m, spot.north_m));
     lines.extend((!distances.is_empty()).then(|| Line::from(format!("  {distances}"))));
     lines.extend(degrees(place.degrees(spot)));

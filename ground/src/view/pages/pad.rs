@@ -10,8 +10,8 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 
 use crate::model::{
-    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, hold_words, is_on_pad, link_hints, why_not_here,
-    why_untested, words,
+    Act, Deflection, LogStanding, Model, SENSORS, Vehicle, field, hold_words, is_on_pad, link_hints,
+    why_not_here, why_untested, words,
 };
 use crate::view::band::{Item, Room, draw_band, word};
 use crate::view::pictures::attitude::{Side, draw_attitude};
@@ -143,15 +143,12 @@ pub fn checks(model: &Model, theme: Theme, now: Duration, all: bool) -> Vec<Line
     };
     let fails = |bit: TdCheck| status.value.checks_failed.contains(bit);
     let made = model.vehicle.checks_made();
-    let (station_log_fails, station_log) = station_log(model, theme, now);
+    let of_station = [Some(station_log(model, theme, now)), motor(model, theme), crowd_line(model, theme)];
+    let (fail, pass): (Vec<_>, Vec<_>) = of_station.into_iter().flatten().partition(|(fails, _)| *fails);
     let several = model.vehicle_rows(now).into_iter();
     let several = several.map(|words| theme.line(format!(" {words}"), TextRole::Alarm));
     let mut lines: Vec<Line> = several.collect();
-    if station_log_fails {
-        lines.push(station_log.clone());
-    }
-    let motor = motor(model, theme);
-    lines.extend(motor.clone().filter(|_| why_untested(model).is_some()));
+    lines.extend(fail.into_iter().map(|(_, line)| line));
     let failed = status.value.checks_failed;
     lines.extend(failed.iter_names().map(|check| match model.vehicle.reported_words(check.1) {
         // A value that is measured now is better than the vehicle's words for an earlier one.
@@ -166,15 +163,21 @@ pub fn checks(model: &Model, theme: Theme, now: Duration, all: bool) -> Vec<Line
     lines.push(theme.line(count, TextRole::Good));
     let measured = |(_, bit): &(&str, TdCheck)| !fails(*bit) && (all || found(*bit).contains(' '));
     lines.extend(made.iter_names().filter(measured).map(|check| row("    ", check, "")));
-    if !station_log_fails {
-        lines.push(station_log);
-    }
-    lines.extend(motor.filter(|_| why_untested(model).is_none()));
+    lines.extend(pass.into_iter().map(|(_, line)| line));
     lines
 }
 
+/// How far people are from the pad, once field, pad and fence are known: the check fails inside the
+/// fence.
+fn crowd_line(model: &Model, theme: Theme) -> Option<(bool, Line<'static>)> {
+    let (crowd_m, fence_m) = field::crowd_and_fence_m(model)?;
+    let word = if crowd_m < fence_m { " NO " } else { "    " };
+    let found = format!("{crowd_m:.0} m, fence {fence_m:.0} m");
+    Some(of_the_station(word, " crowd line  ", found, theme))
+}
+
 /// Whether burns of its lot confirm the landing motor, once the vehicle has reported its mission.
-fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
+fn motor(model: &Model, theme: Theme) -> Option<(bool, Line<'static>)> {
     let burns = model.vehicle.mission()?.motor_burns;
     let (word, found) = match burns {
         0 if why_untested(model).is_some() => (" NO ", "UNCONFIRMED: no burn of its lot".to_owned()),
@@ -185,14 +188,20 @@ fn motor(model: &Model, theme: Theme) -> Option<Line<'static>> {
     Some(of_the_station(word, " motor       ", found, theme))
 }
 
-/// A check that the station makes.
-fn of_the_station(word: &'static str, name: &'static str, found: String, theme: Theme) -> Line<'static> {
+/// A check that the station makes, and whether it fails.
+fn of_the_station(
+    word: &'static str,
+    name: &'static str,
+    found: String,
+    theme: Theme,
+) -> (bool, Line<'static>) {
     let (role, found_role) = match word {
         " NO " => (TextRole::Alarm, TextRole::Caution),
         " !! " => (TextRole::Caution, TextRole::Caution),
         _ => (TextRole::Plain, TextRole::Plain),
     };
-    Line::from(vec![theme.span(word, role), theme.plain(name), theme.span(found, found_role)])
+    let spans = vec![theme.span(word, role), theme.plain(name), theme.span(found, found_role)];
+    (role == TextRole::Alarm, Line::from(spans))
 }
 
 /// Whether the checks pass, in words.
@@ -216,7 +225,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     }
 }
 
-/// Whether the station's own log fails as a check, and its row.
+/// The row of the station's own log.
 fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'static>) {
     let space = model.log.space.map_or_else(|| "running".to_owned(), |space| space.words());
     let (word, found) = match model.station_log(now) {
@@ -226,7 +235,7 @@ fn station_log(model: &Model, theme: Theme, now: Duration) -> (bool, Line<'stati
         LogStanding::Unfit(_, words) if model.why_no_log(now).is_some() => (" NO ", words),
         LogStanding::Unfit(_, words) => (" !! ", format!("overruled: {words}")),
     };
-    (word == " NO ", of_the_station(word, " station log ", found, theme))
+    of_the_station(word, " station log ", found, theme)
 }
 
 /// The value that telemetry shows for a check, empty if there is none; and why the check fails, if
@@ -288,7 +297,9 @@ fn ladder(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
     let phase = vehicle.phase_now();
     let armed = vehicle.is_armed();
     let on_pad = phase.is_some_and(is_on_pad);
-    let checked = on_pad && vehicle.reports(|status| status.checks_failed.is_empty());
+    let checked = on_pad
+        && vehicle.reports(|status| status.checks_failed.is_empty())
+        && field::crowd_inside_fence(model).is_none();
     let pin_out = vehicle.shows(TdInterlock::TD_INTERLOCK_PIN_OUT);
     let counting = vehicle.countdown_s().is_some();
     let two = model.people() == Some(2);

@@ -11,7 +11,8 @@ use ratatui::widgets::canvas::Circle;
 use super::field::draw_lines;
 use super::{DOTS_ACROSS, Ink, Plane, TextRole, Theme, circle};
 use crate::model::{
-    Model, Spot, dead_reckoning::predict_position, field, is_burning, is_on_pad, quantity::Quantity,
+    Degrees, Model, Page, Spot, dead_reckoning::predict_position, field, is_burning, is_on_pad,
+    quantity::Quantity,
 };
 use crate::view::{fixed, shortest, widgets};
 
@@ -28,6 +29,8 @@ const EDGE: f64 = 1.15;
 const FENCE_COST_MAX: f64 = 15.0;
 /// The steps of the place and the radius of the circle of the uncertainty, in reaches.
 const SPREAD_STEP: f64 = 1.0 / 6.0;
+/// How far from the pad another vehicle is drawn if there is no fence, m.
+const TRACKER_NEAR_M: f64 = 500.0;
 /// A rail that leans less than this is taken as upright, degrees.
 const RAIL_LEANS_DEG: f64 = 0.5;
 /// How far back predictions of the touchdown count for its uncertainty.
@@ -115,9 +118,18 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
     let around = |(x, y): (f64, f64), radius: f64| [(x - radius, y - radius), (x + radius, y + radius)];
     let on_pad = phase.is_some_and(is_on_pad);
-    let crew = vehicle.pad.zip(model.settings.here).filter(|_| on_pad).map(|(pad, here)| pad.to(here));
-    let crew = crew.map(|(north_m, east_m)| (east_m, north_m));
+    let finds = model.page() == Page::Find;
+    let of_pad = |at: Degrees| vehicle.pad.map(|pad| pad.to(at)).map(|(north_m, east_m)| (east_m, north_m));
+    let crew = model.here().filter(|_| on_pad || finds).and_then(of_pad);
+    let trackers = model.trackers.iter().filter_map(|(id, tracker)| Some((*id, of_pad(tracker.at.value)?)));
+    // One far away would make everything small, unless the crew looks for it.
+    let near_m = fence_m.unwrap_or(TRACKER_NEAR_M);
+    let is_drawn = |(id, (x, y)): &(u8, (f64, f64))| {
+        libm::hypot(*x, *y) < near_m || (finds && model.pages.tracker == Some(*id))
+    };
+    let trackers: Vec<(u8, (f64, f64))> = trackers.filter(is_drawn).collect();
     let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
+    points.extend(trackers.iter().map(|(_, at)| at));
     points.extend(lost.iter().flat_map(|at| around((at.east_m, at.north_m), at.error_m.min(500.0))));
     points.extend(down.iter().map(|at| (at.east_m, at.north_m)).chain(impact));
     if !burns || points.is_empty() {
@@ -195,7 +207,13 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     label(frame, (0.0, 0.0), "pad");
     if let Some(at) = crew {
         plane.write(frame, at, "o", strong);
-        label(frame, at, &format!("crew {} m", fixed(libm::hypot(at.0, at.1), 0)));
+        let words =
+            if finds { "here".to_owned() } else { format!("crew {} m", fixed(libm::hypot(at.0, at.1), 0)) };
+        label(frame, at, &words);
+    }
+    for (id, at) in trackers {
+        plane.write(frame, at, "*", strong);
+        label(frame, at, &format!("system {id}"));
     }
     if let Some((at, tilt_deg)) = rail {
         label(frame, at, &format!("rail {} deg", fixed(tilt_deg, 0)));

@@ -9,6 +9,9 @@ use crate::recipe::Recipe;
 
 /// The fact about a run with the text of its field.
 pub const RUN_FACT: &str = "field";
+/// The fact about a run with the latitude and longitude of its pad, degrees, beside its field: a
+/// station's log has no mission.
+pub const PAD_FACT: &str = "pad";
 
 /// This recipe with the field that its mission names, whose file is at this path.
 ///

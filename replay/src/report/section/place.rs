@@ -3,7 +3,7 @@
 use flight::rules::phase::Phase;
 use protocol::field::{Field, Kind};
 use protocol::motion::Degrees;
-use sim::wire::field::{RUN_FACT, pad_of};
+use sim::wire::field::{PAD_FACT, RUN_FACT, pad_of};
 
 use crate::report::chart::{Chart, Line, line};
 use crate::report::html::table;
@@ -21,11 +21,14 @@ const STAGES: [Stage; 4] = [
 
 /// The title of the map.
 const COMPLETE: &str = "Place from above, m";
+/// How far from the pad a field is drawn in the log of a station, which has no fence, m.
+const FIELD_REACH_M: f64 = 500.0;
 
 /// The place from above: inside its fence, and closer.
 pub(super) fn maps(flight: &Flight) -> String {
     let fence_m = flight.pilot.as_ref().map(|pilot| pilot.mission().gate.fence_radius_m);
-    let fence = fence_m.filter(|fence_m| fence_m.is_finite()).map(|fence_m| {
+    let fence_m = fence_m.filter(|fence_m| fence_m.is_finite());
+    let fence = fence_m.map(|fence_m| {
         let corner = |corner: u32| {
             let (sin, cos) = libm::sincos(f64::from(corner).to_radians());
             (fence_m * sin, fence_m * cos)
@@ -51,9 +54,11 @@ pub(super) fn maps(flight: &Flight) -> String {
         arrow: arrow.clone(),
         ..Chart::default()
     };
-    let Some(fence) = fence else { return picture(COMPLETE, Vec::new()).svg() };
-    let field = field_lines(flight, 2.0 * fence_m.unwrap_or_default());
-    let outside = std::iter::once(fence).chain(field).collect();
+    let field = field_lines(flight, fence_m.map_or(FIELD_REACH_M, |fence_m| 2.0 * fence_m));
+    let outside: Vec<Line> = fence.into_iter().chain(field).collect();
+    if outside.is_empty() {
+        return picture(COMPLETE, outside).svg();
+    }
     picture(COMPLETE, outside).svg()
         + &picture("The same closer, m", Vec::new()).svg()
         + &field_distances(flight)
@@ -61,8 +66,10 @@ pub(super) fn maps(flight: &Flight) -> String {
 
 /// The field around the pad that the log has.
 fn field_of(flight: &Flight) -> Option<(Field, Degrees)> {
-    let pad = pad_of(flight.pilot.as_ref()?.mission());
-    Some((Field::parse(flight.recording.head.run.get(RUN_FACT)?, pad, RUN_FACT).ok()?, pad))
+    let facts = &flight.recording.head.run;
+    let pad = flight.pilot.as_ref().map(|pilot| pad_of(pilot.mission()));
+    let pad = pad.or_else(|| facts.get(PAD_FACT)?.parse().ok())?;
+    Some((Field::parse(facts.get(RUN_FACT)?, pad, RUN_FACT).ok()?, pad))
 }
 
 /// The lines of the field east and north of the pad, m, clipped to a square about it, so that the
