@@ -4,8 +4,8 @@ use mavlink::MessageData as _;
 use num_traits::FromPrimitive as _;
 
 use crate::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_BOOK_KEPT_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_BOOK_KEPT_DATA, TD_CONTROLLER_DATA, TD_EVENTS_DATA,
+    TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
 };
 use crate::frame::Frame;
 use crate::identity::PHASE_BITS;
@@ -42,6 +42,45 @@ pub fn boot_of(frame: &Frame) -> Option<u32> {
         _ => 0,
     };
     (boot > 0).then_some(boot)
+}
+
+/// An event of a flight: the entry of a phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FlightEvent {
+    pub phase: TdPhase,
+    /// Time since the release, s.
+    pub at_s: f64,
+    /// Height of the feet above the pad, m.
+    pub height_m: f64,
+}
+
+/// The events of a flight, as far as the vehicle's reports have arrived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FlightEvents(Vec<FlightEvent>);
+
+impl FlightEvents {
+    /// Takes a report. What a restarted flight computer no longer reports stays.
+    pub fn take(&mut self, message: &TD_EVENTS_DATA) {
+        for (place, (at_ms, height_m)) in message.at_ms.into_iter().zip(message.height_m).enumerate() {
+            let number = TdPhase::TD_PHASE_BOOST as u32 + place as u32;
+            let phase = phase_from_number(number).filter(|_| message.entered >> number & 1 == 1);
+            let Some(phase) = phase else { continue };
+            self.0.retain(|event| event.phase != phase);
+            // The product of the vehicle's own clock: the same bits.
+            self.0.push(FlightEvent { phase, at_s: f64::from(at_ms) * 1e-3, height_m: height_m.into() });
+        }
+        self.0.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    }
+
+    /// The event that begins a phase.
+    pub fn of(&self, phase: TdPhase) -> Option<FlightEvent> {
+        self.0.iter().find(|event| event.phase == phase).copied()
+    }
+
+    /// In order of time.
+    pub fn in_time(&self) -> &[FlightEvent] {
+        &self.0
+    }
 }
 
 /// The last of each message that is part of the record.
