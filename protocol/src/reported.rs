@@ -44,6 +44,23 @@ pub fn boot_of(frame: &Frame) -> Option<u32> {
     (boot > 0).then_some(boot)
 }
 
+/// The event that begins a phase, as screens and reports name it; `None` on the pad.
+pub fn event_of(phase: TdPhase) -> Option<&'static str> {
+    Some(match phase {
+        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
+        TdPhase::TD_PHASE_BOOST => "lift-off",
+        TdPhase::TD_PHASE_COAST => "burnout",
+        TdPhase::TD_PHASE_DEPLOY => "apogee",
+        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
+        TdPhase::TD_PHASE_LAND_ARMED => "ready",
+        TdPhase::TD_PHASE_IGNITION => "ignition",
+        TdPhase::TD_PHASE_POWERED => "thrust",
+        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
+        TdPhase::TD_PHASE_SAFED => "over",
+        TdPhase::TD_PHASE_CHUTE => "parachute",
+    })
+}
+
 /// An event of a flight: the entry of a phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlightEvent {

@@ -17,7 +17,7 @@ use protocol::log::reader::{LogItem, LogReader};
 use protocol::log::record::{TOPIC_RAW_RX, TOPIC_RAW_TX};
 use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 
-use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
+use crate::model::{CommandKind, ReportedEvents, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
 
 /// A larger step back in time means that the clock was set back, not that frames of two links are
@@ -78,7 +78,8 @@ impl Recording {
             };
             anyhow::bail!("{shown}: {why}");
         };
-        let Survey { events: count, length, phases, .. } = survey;
+        let Survey { events: count, length, mut phases, reported, .. } = survey;
+        reported.date(&mut phases);
         let (damage, vehicle) = (events.damage(), events.vehicle);
         Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
     }
@@ -106,6 +107,7 @@ struct Survey {
     has_vehicle: bool,
     length: Duration,
     phases: Vec<(TdPhase, Duration)>,
+    reported: ReportedEvents,
 }
 
 impl Survey {
@@ -114,7 +116,9 @@ impl Survey {
         self.events += 1;
         if let Msg::Frame(frame) = event {
             self.has_vehicle = true;
-            if let Some(phase) = phase_of(frame)
+            let Ok(message) = frame.decode() else { return };
+            self.reported.note(&message, at);
+            if let Some(phase) = phase_of(&message)
                 && self.phases.last().is_none_or(|(last, _)| *last != phase)
                 && self.phases.len() < PHASES_MAX
             {
@@ -149,9 +153,9 @@ impl RecordingClock {
     }
 }
 
-fn phase_of(frame: &Frame) -> Option<TdPhase> {
-    match frame.decode().ok()? {
-        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(&data),
+fn phase_of(message: &MavMessage) -> Option<TdPhase> {
+    match message {
+        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(data),
         MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
         _ => None,
     }
