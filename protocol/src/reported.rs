@@ -63,40 +63,44 @@ pub fn event_of(phase: TdPhase) -> Option<&'static str> {
 
 /// An event of a flight: the entry of a phase.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "program", derive(serde::Serialize))]
 pub struct FlightEvent {
-    pub phase: TdPhase,
+    /// As screens and reports name it.
+    pub name: &'static str,
     /// Time since the release, s.
     pub at_s: f64,
     /// Height of the feet above the pad, m.
     pub height_m: f64,
+    #[cfg_attr(feature = "program", serde(skip))]
+    pub phase: TdPhase,
 }
 
 /// The events of a flight, as far as the vehicle's reports have arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct FlightEvents(Vec<FlightEvent>);
+pub struct FlightEvents {
+    boot_number: u32,
+    /// In order of time.
+    pub received: Vec<FlightEvent>,
+}
 
 impl FlightEvents {
-    /// Takes a report. What a restarted flight computer no longer reports stays.
+    /// Takes a report. Events that a restarted flight computer no longer reports remain.
     pub fn take(&mut self, message: &TD_EVENTS_DATA) {
+        if message.boot_number != self.boot_number {
+            *self = Self { boot_number: message.boot_number, received: Vec::new() };
+        }
         for (place, (at_ms, height_m)) in message.at_ms.into_iter().zip(message.height_m).enumerate() {
             let number = TdPhase::TD_PHASE_BOOST as u32 + place as u32;
             let phase = phase_from_number(number).filter(|_| message.entered >> number & 1 == 1);
-            let Some(phase) = phase else { continue };
-            self.0.retain(|event| event.phase != phase);
-            // The product of the vehicle's own clock: the same bits.
-            self.0.push(FlightEvent { phase, at_s: f64::from(at_ms) * 1e-3, height_m: height_m.into() });
+            let Some((phase, name)) = phase.and_then(|phase| Some((phase, event_of(phase)?))) else {
+                continue;
+            };
+            self.received.retain(|event| event.phase != phase);
+            // As the vehicle computes its time: the same bits.
+            let (at_s, height_m) = (f64::from(at_ms) * 1e-3, f64::from(height_m));
+            self.received.push(FlightEvent { name, at_s, height_m, phase });
         }
-        self.0.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    }
-
-    /// The event that begins a phase.
-    pub fn of(&self, phase: TdPhase) -> Option<FlightEvent> {
-        self.0.iter().find(|event| event.phase == phase).copied()
-    }
-
-    /// In order of time.
-    pub fn in_time(&self) -> &[FlightEvent] {
-        &self.0
+        self.received.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     }
 }
 

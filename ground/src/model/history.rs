@@ -43,12 +43,13 @@ impl ReportedEvents {
 
     /// Time since the release, s, and height, m, of the event that begins a phase.
     pub fn of(&self, phase: TdPhase) -> Option<(f64, f64)> {
-        self.reported.of(phase).map(|event| (event.at_s, event.height_m))
+        let event = self.reported.received.iter().find(|event| event.phase == phase)?;
+        Some((event.at_s, event.height_m))
     }
 
     /// Dates the phases as the vehicle reports them, not as its messages arrive.
     pub(crate) fn date(&self, timeline: &mut Vec<(TdPhase, Duration)>) {
-        for event in self.reported.in_time() {
+        for event in &self.reported.received {
             let since = Duration::try_from_secs_f64(event.at_s).ok();
             let Some((released_at, since)) = self.released_at.zip(since) else { continue };
             timeline.retain(|(phase, _)| *phase != event.phase);
