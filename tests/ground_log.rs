@@ -103,7 +103,10 @@ fn its_ignition_has_one_time_and_one_height(folder: &Path, own: &Ended, heard: &
     }
     let number = |text: &str| text.parse::<f64>().unwrap();
     let mut playback = program(Program::Ground);
-    playback.args(["replay", "ground.mcap"]).current_dir(folder).env("TERM", "xterm-256color");
+    playback
+        .args(["--replay", "ground.mcap", "--from", "POWERED"])
+        .current_dir(folder)
+        .env("TERM", "xterm-256color");
     let screen = Terminal::start(&mut playback, (160, 50), false);
     for words in
         [format!("ignition {:.1}", number(at_s)), format!("{:.0} m, T+{:.1}", number(height_m), number(at_s))]
