@@ -8,7 +8,7 @@ use protocol::identity::VEHICLE;
 use protocol::log::tlog::TlogReader;
 use protocol::reported::ReportedState;
 
-use e2e::{Ended, Program, Running, auto_ground, expect_landing, program, vehicle};
+use e2e::{Ended, Program, Running, Terminal, auto_ground, expect_landing, program, vehicle};
 
 fn replay(folder: &Path, arguments: &[&str]) -> Ended {
     let ended = Running::to_end(program(Program::Replay).args(arguments).current_dir(folder));
@@ -56,6 +56,8 @@ fn the_stations_record_agrees_with_the_vehicles_log() {
         assert!(page.contains("STANDS UNDAMAGED") && page.contains("touchdown"), "{log}");
     }
 
+    its_ignition_has_one_time_and_one_height(folder, &own, &heard);
+
     // Each row of the station's tables is a row that the vehicle's log says it sent.
     for log in ["vehicle", "ground"] {
         replay(folder, &["export", &format!("{log}.mcap"), "--out", log]);
@@ -81,6 +83,36 @@ fn the_stations_record_agrees_with_the_vehicles_log() {
     }
 
     its_tlog_reports_the_same(folder);
+}
+
+/// `replay info` of both logs, both reports and the screen print the same of the ignition, each to
+/// its last digit.
+fn its_ignition_has_one_time_and_one_height(folder: &Path, own: &Ended, heard: &Ended) {
+    let [own, heard] = [own, heard].map(|info| {
+        let events = fact(info, "events").split(", ").map(str::trim);
+        events.filter(|event| !event.starts_with("over")).collect::<Vec<_>>()
+    });
+    assert_eq!(own[1..], heard[1..own.len()]);
+    let ignition = own.iter().find_map(|event| event.strip_prefix("ignition ")).unwrap();
+    let [at_s, height_m] = ignition.trim_end_matches(" m").split_once(' ').map(Into::into).unwrap();
+    for log in ["vehicle", "ground"] {
+        let page = std::fs::read_to_string(folder.join(format!("{log}.html"))).unwrap();
+        let row = page.lines().find(|line| line.contains("<td>ignition</td>")).unwrap();
+        let cells = format!("<td class=\"n\">{at_s}</td><td class=\"n\">{height_m}</td>");
+        assert!(row.contains(&cells), "{log}: no {cells} in {row}");
+    }
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    let mut playback = program(Program::Ground);
+    playback
+        .args(["--replay", "ground.mcap", "--from", "POWERED"])
+        .current_dir(folder)
+        .env("TERM", "xterm-256color");
+    let screen = Terminal::start(&mut playback, (160, 50), false);
+    for words in
+        [format!("ignition {:.1}", number(at_s)), format!("{:.0} m, T+{:.1}", number(height_m), number(at_s))]
+    {
+        screen.wait_for(&words);
+    }
 }
 
 /// What a station records ten times a second, of the vehicle's state: which of its moments it takes

@@ -17,6 +17,7 @@ use flight::vehicle::fins::{PITCH, YAW};
 use flight::vehicle::mission::{Mission, SensorPlaces};
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
+use serde_json::{Value, json};
 use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
 
@@ -141,6 +142,16 @@ pub struct Page {
 }
 
 impl Page {
+    /// The page as JSON.
+    pub fn json(&self) -> Value {
+        let row = |row: &Row| {
+            let Row { what, found, beside, verdict, change } = row;
+            json!({ "what": what, "found": found, "beside": beside, "verdict": verdict.name(), "change": change })
+        };
+        let rows: Vec<Value> = self.rows.iter().map(row).collect();
+        json!({ "title": self.title, "verdict": self.verdict().name(), "rows": rows })
+    }
+
     /// The worst answer.
     pub fn verdict(&self) -> Verdict {
         worst(&self.rows)

@@ -17,6 +17,7 @@ use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
+use serde_json::{Value, json};
 use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
 use sim::recipe::Recipe;
@@ -349,6 +350,23 @@ pub fn widest(impacts: &[Impact]) -> Option<(Case, Radius)> {
     radii.max_by(|one, two| {
         let ((one_m, one_ends), (two_m, two_ends)) = (key(&one.1), key(&two.1));
         one_m.total_cmp(&two_m).then(one_ends.cmp(&two_ends))
+    })
+}
+
+/// Where flights in one wind come down, as JSON: by case, and the distance of people, m.
+pub fn json(wind_m_s: f64, impacts: &[Impact], rule: &Rule) -> Value {
+    let of_case = |case: Case| {
+        let Radius { flights, holds_m, low_m, high_m, farthest_m } = Radius::of_case(impacts, case)?;
+        Some(
+            json!({ "case": case.name(), "flights": flights, "holds_99_percent_m": holds_m, "low_m": low_m, "high_m": high_m, "farthest_m": farthest_m }),
+        )
+    };
+    let cases: Vec<Value> = Case::ALL.into_iter().filter_map(of_case).collect();
+    let (widest, landed) = (widest(impacts), landed_as_planned(impacts));
+    json!({
+        "wind_m_s": wind_m_s, "cases": cases, "widest": widest.map(|(case, _)| case.name()),
+        "nobody_within_m": widest.map(|(_, radius)| exclusion_m(&radius, rule)),
+        "flights": landed.stands.of, "stand": landed.stands.count, "inside_envelope": landed.envelope.count,
     })
 }
 

@@ -4,8 +4,8 @@ use mavlink::MessageData as _;
 use num_traits::FromPrimitive as _;
 
 use crate::dialect::{
-    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_BOOK_KEPT_DATA, TD_CONTROLLER_DATA, TD_FINS_DATA,
-    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
+    HEARTBEAT_DATA, MavAutopilot, MavMessage, MavType, TD_BOOK_KEPT_DATA, TD_CONTROLLER_DATA, TD_EVENTS_DATA,
+    TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TdPhase,
 };
 use crate::frame::Frame;
 use crate::identity::PHASE_BITS;
@@ -42,6 +42,66 @@ pub fn boot_of(frame: &Frame) -> Option<u32> {
         _ => 0,
     };
     (boot > 0).then_some(boot)
+}
+
+/// The event that begins a phase, as screens and reports name it; `None` on the pad.
+pub fn event_of(phase: TdPhase) -> Option<&'static str> {
+    Some(match phase {
+        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
+        TdPhase::TD_PHASE_BOOST => "lift-off",
+        TdPhase::TD_PHASE_COAST => "burnout",
+        TdPhase::TD_PHASE_DEPLOY => "apogee",
+        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
+        TdPhase::TD_PHASE_LAND_ARMED => "ready",
+        TdPhase::TD_PHASE_IGNITION => "ignition",
+        TdPhase::TD_PHASE_POWERED => "thrust",
+        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
+        TdPhase::TD_PHASE_SAFED => "over",
+        TdPhase::TD_PHASE_CHUTE => "parachute",
+    })
+}
+
+/// An event of a flight: the entry of a phase.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "program", derive(serde::Serialize))]
+pub struct FlightEvent {
+    /// As screens and reports name it.
+    pub name: &'static str,
+    /// Time since the release, s.
+    pub at_s: f64,
+    /// Height of the feet above the pad, m.
+    pub height_m: f64,
+    #[cfg_attr(feature = "program", serde(skip))]
+    pub phase: TdPhase,
+}
+
+/// The events of a flight, as far as the vehicle's reports have arrived.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct FlightEvents {
+    boot_number: u32,
+    /// In order of time.
+    pub received: Vec<FlightEvent>,
+}
+
+impl FlightEvents {
+    /// Takes a report. Events that a restarted flight computer no longer reports remain.
+    pub fn take(&mut self, message: &TD_EVENTS_DATA) {
+        if message.boot_number != self.boot_number {
+            *self = Self { boot_number: message.boot_number, received: Vec::new() };
+        }
+        for (place, (at_ms, height_m)) in message.at_ms.into_iter().zip(message.height_m).enumerate() {
+            let number = TdPhase::TD_PHASE_BOOST as u32 + place as u32;
+            let phase = phase_from_number(number).filter(|_| message.entered >> number & 1 == 1);
+            let Some((phase, name)) = phase.and_then(|phase| Some((phase, event_of(phase)?))) else {
+                continue;
+            };
+            self.received.retain(|event| event.phase != phase);
+            // As the vehicle computes its time: the same bits.
+            let (at_s, height_m) = (f64::from(at_ms) * 1e-3, f64::from(height_m));
+            self.received.push(FlightEvent { name, at_s, height_m, phase });
+        }
+        self.received.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    }
 }
 
 /// The last of each message that is part of the record.

@@ -85,13 +85,23 @@ fn write_cell(cell: &Cell, text: &mut Vec<u8>) -> io::Result<()> {
     }
 }
 
+/// A directory, or a file of a format that is written.
+fn destination(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match ending(&path).as_str() {
+        "" | "kml" | "gpx" => Ok(path),
+        _ if path.is_dir() => Ok(path),
+        other => Err(format!(".{other} cannot be written: a directory, .kml or .gpx is accepted")),
+    }
+}
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct Args {
     /// The log, an MCAP file.
     file: PathBuf,
     /// The directory to write, one file for each table; or a file for maps, .kml or .gpx: the flown
     /// path, the touchdown planned at ignition, and the fence.
-    #[arg(long, short, alias = "output", value_name = "PATH")]
+    #[arg(long, short, alias = "output", value_name = "PATH", value_parser = destination)]
     out: PathBuf,
     /// Answer about tables in JSON.
     #[arg(long)]

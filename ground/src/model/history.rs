@@ -2,7 +2,8 @@
 
 use std::time::Duration;
 
-use protocol::dialect::TdPhase;
+use protocol::dialect::{MavMessage, TdPhase};
+use protocol::reported::FlightEvents;
 
 use super::quantity::{ALL, COUNT, Quantity};
 use super::{Model, every_second, is_flight, is_on_pad};
@@ -13,11 +14,49 @@ pub(crate) const TIMELINE_MAX: usize = 64;
 /// What the review page shows.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Each phase and when it was first received, since the start of the run.
+    /// Each phase and when it began, since the start of the run: received, until its event is reported.
     pub timeline: Vec<(TdPhase, Duration)>,
     /// The longest time without a heartbeat in flight.
     pub silence: Duration,
     pub trace: Trace,
+}
+
+/// The events that a vehicle has reported, and its release on the clock of the station.
+#[derive(Debug, Clone, Default)]
+pub struct ReportedEvents {
+    reported: FlightEvents,
+    /// By the status that took least time to arrive.
+    released_at: Option<Duration>,
+}
+
+impl ReportedEvents {
+    pub(crate) fn note(&mut self, message: &MavMessage, now: Duration) {
+        match message {
+            MavMessage::TD_EVENTS(data) => self.reported.take(data),
+            MavMessage::TD_FLIGHT_STATUS(status) if status.countdown_ms < 0 => {
+                let since = Duration::from_millis(status.countdown_ms.unsigned_abs().into());
+                self.released_at = self.released_at.into_iter().chain(now.checked_sub(since)).min();
+            }
+            _ => {}
+        }
+    }
+
+    /// Time since the release, s, and height, m, of the event that begins a phase.
+    pub fn of(&self, phase: TdPhase) -> Option<(f64, f64)> {
+        let event = self.reported.received.iter().find(|event| event.phase == phase)?;
+        Some((event.at_s, event.height_m))
+    }
+
+    /// Dates the phases as the vehicle reports them, not as its messages arrive.
+    pub(crate) fn date(&self, timeline: &mut Vec<(TdPhase, Duration)>) {
+        for event in &self.reported.received {
+            let since = Duration::try_from_secs_f64(event.at_s).ok();
+            let Some((released_at, since)) = self.released_at.zip(since) else { continue };
+            timeline.retain(|(phase, _)| *phase != event.phase);
+            timeline.push((event.phase, released_at + since));
+        }
+        timeline.sort_by_key(|(_, at)| *at);
+    }
 }
 
 // Every quantity over time, in a bounded number of rows: the recent past in full, the distant past
@@ -96,9 +135,10 @@ pub(crate) fn note_trace(model: &mut Model, now: Duration) {
     model.history.trace.push(now, row);
 }
 
-/// When the flight began.
+/// When the flight began: T+0, or if no release is reported, its first phase.
 pub fn flight_began(model: &Model) -> Option<Duration> {
-    model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at)
+    let first = model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
+    first.map(|first| model.vehicle.events.released_at.unwrap_or(first))
 }
 
 #[cfg(test)]

@@ -24,6 +24,7 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     }
     vehicle.boot.note(message);
     vehicle.reported.update(message);
+    vehicle.events.note(message, now);
     vehicle.store(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),

@@ -14,7 +14,7 @@ use protocol::reported::ReportedState;
 
 use super::{
     Attitude, BodySpeed, Boot, Deflection, KeepAway, Motion, NorthEastUp, PadCheck, ReportedChecks,
-    Touchdown, Trend,
+    ReportedEvents, Touchdown, Trend,
 };
 
 /// A value older than this is marked as stale.
@@ -134,6 +134,7 @@ pub struct Vehicle {
     pub operators: BTreeMap<u8, (TdRole, String)>,
     /// `TD_PAD_CHECK`: the last check on the pad.
     pub pad_check: Option<PadCheck>,
+    pub events: ReportedEvents,
     /// `TD_FINDING`: what went wrong in its flight, as the vehicle reports it.
     pub findings: Findings,
     /// The recent change of its velocity.

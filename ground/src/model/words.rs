@@ -18,23 +18,6 @@ pub fn phase(phase: TdPhase) -> String {
     without_prefix(&phase, "TD_PHASE_")
 }
 
-/// The event that begins a phase, as the timeline names it; `None` if the crew need not see it.
-pub fn event_of(phase: TdPhase) -> Option<&'static str> {
-    Some(match phase {
-        TdPhase::TD_PHASE_SAFE | TdPhase::TD_PHASE_PAD_IDLE | TdPhase::TD_PHASE_PAD_ARMED => return None,
-        TdPhase::TD_PHASE_BOOST => "lift-off",
-        TdPhase::TD_PHASE_COAST => "burnout",
-        TdPhase::TD_PHASE_DEPLOY => "apogee",
-        TdPhase::TD_PHASE_AERO_DESCENT => "falls",
-        TdPhase::TD_PHASE_LAND_ARMED => "ready",
-        TdPhase::TD_PHASE_IGNITION => "ignition",
-        TdPhase::TD_PHASE_POWERED => "thrust",
-        TdPhase::TD_PHASE_TOUCHDOWN => "touchdown",
-        TdPhase::TD_PHASE_SAFED => "over",
-        TdPhase::TD_PHASE_CHUTE => "parachute",
-    })
-}
-
 /// The text of an event for the crew; `None` if other events or the state show the same. The log
 /// stores the original.
 pub fn of_event(text: &str) -> Option<Cow<'_, str>> {

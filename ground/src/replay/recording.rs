@@ -21,7 +21,7 @@ use protocol::log::tlog::{TlogFrame, TlogReader, is_tlog};
 use protocol::motion::Degrees;
 use sim::wire::field::RUN_FACT;
 
-use crate::model::{CommandKind, telemetry::phase_of as phase_of_heartbeat};
+use crate::model::{CommandKind, ReportedEvents, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
 use crate::update::frames::GLOBAL_POSITION_ID;
 
@@ -90,7 +90,8 @@ impl Recording {
             };
             anyhow::bail!("{shown}: {why}");
         };
-        let Survey { events: count, length, phases, pad, .. } = survey;
+        let Survey { events: count, length, mut phases, reported, pad, .. } = survey;
+        reported.date(&mut phases);
         let (damage, vehicle) = (events.damage(), events.vehicle);
         let field = events.field.zip(pad).and_then(|(text, pad)| Field::parse(&text, pad, RUN_FACT).ok());
         Ok(Self { damage, vehicle, field, file, side, events: count, length, phases: phases.into() })
@@ -120,6 +121,7 @@ struct Survey {
     length: Duration,
     phases: Vec<(TdPhase, Duration)>,
     pad: Option<Degrees>,
+    reported: ReportedEvents,
 }
 
 impl Survey {
@@ -128,16 +130,12 @@ impl Survey {
         self.events += 1;
         if let Msg::Frame(frame) = event {
             self.has_vehicle = true;
-            let phase = match frame.decode() {
-                Ok(MavMessage::HEARTBEAT(data)) => phase_of_heartbeat(&data),
-                Ok(MavMessage::TD_FLIGHT_STATUS(data)) => Some(data.phase),
-                Ok(MavMessage::HOME_POSITION(data)) => {
-                    self.pad = Degrees::of_e7(data.latitude, data.longitude).or(self.pad);
-                    None
-                }
-                _ => None,
-            };
-            if let Some(phase) = phase
+            let Ok(message) = frame.decode() else { return };
+            self.reported.note(&message, at);
+            if let MavMessage::HOME_POSITION(data) = &message {
+                self.pad = Degrees::of_e7(data.latitude, data.longitude).or(self.pad);
+            }
+            if let Some(phase) = phase_of(&message)
                 && self.phases.last().is_none_or(|(last, _)| *last != phase)
                 && self.phases.len() < PHASES_MAX
             {
@@ -169,6 +167,14 @@ impl RecordingClock {
             self.zero_ns = Some(stamp_ns - last_ns);
         }
         Duration::from_nanos(self.last_ns)
+    }
+}
+
+fn phase_of(message: &MavMessage) -> Option<TdPhase> {
+    match message {
+        MavMessage::HEARTBEAT(data) => phase_of_heartbeat(data),
+        MavMessage::TD_FLIGHT_STATUS(data) => Some(data.phase),
+        _ => None,
     }
 }
 

@@ -170,6 +170,7 @@ fn on_vehicle_frame(model: &mut Model, frame: &Frame, now: Duration) {
     }
     let after = vehicle_changes::Announced::of(&model.vehicle);
     vehicle_changes::on_change(model, &before, &after, now);
+    model.vehicle.events.date(&mut model.history.timeline);
     vehicle_changes::enter_crew_changes(model, &before, &after, now);
     pad::enter_check(model, now);
     commands::observe(model, now);

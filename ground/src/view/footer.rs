@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use protocol::dialect::TdPhase;
 use protocol::log::record::EventLevel;
+use protocol::reported::event_of;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
@@ -15,7 +16,7 @@ use super::status_lines::{alarm_text, replay_line};
 use super::{Ink, TextRole, Theme, draw_line, side_by_side, top_lines};
 use crate::model::{
     Act, Event, KeepAway, Model, Page, Playback, dead_reckoning::is_silent, dead_reckoning::predicted_course,
-    flight_began, is_burning, is_flight, is_on_pad, words,
+    flight_began, is_burning, is_flight, is_on_pad,
 };
 use crate::view::pictures::seconds_since;
 
@@ -146,8 +147,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
         let again = matches!(before, Some(TdPhase::TD_PHASE_DEPLOY | TdPhase::TD_PHASE_IGNITION));
-        let name =
-            if commanded { "ignition commanded" } else { words::event_of(*phase).filter(|_| !again)? };
+        let name = if commanded { "ignition commanded" } else { event_of(*phase).filter(|_| !again)? };
         Some((name, *at, *at, BEEN, Ink::Measured))
     });
     // In steps, so that it does not tremble; never in the past.

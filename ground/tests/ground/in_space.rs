@@ -100,7 +100,6 @@ fn burning_in_space() -> Rig {
     fall(TdPhase::TD_PHASE_IGNITION, 17..18, (120.0, 6.0));
     fall(TdPhase::TD_PHASE_POWERED, 7..17, (300.0, 28.0));
     rig.abort_effect = TdAbortEffect::TD_ABORT_EFFECT_LAND_IN_PLACE;
-    rig.countdown_ms = -2_700;
     rig.run(0.2);
     rig.state_in_space([8.0, -5.5, 27.5], [-3.0, 2.0, -13.0], (300.0, 28.0));
     rig.plan_along(&[(8.0, 27.0), (6.5, 20.0), (5.0, 14.0), (3.5, 8.5), (2.5, 4.0), (1.8, 1.5), (1.4, 0.0)]);

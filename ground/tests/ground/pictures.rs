@@ -79,7 +79,6 @@ pub(crate) fn flying(until: TdPhase) -> Rig {
     rig.phase = TdPhase::TD_PHASE_BOOST;
     for k in 0..60_u16 {
         let t = f32::from(k) * 0.1;
-        rig.countdown_ms = -100 * i32::from(k);
         if k == 15 {
             rig.phase = TdPhase::TD_PHASE_COAST;
         }
@@ -97,7 +96,6 @@ pub(crate) fn flying(until: TdPhase) -> Rig {
     rig.text("fins open");
     for k in 0..90_u16 {
         let t = f32::from(k) * 0.1;
-        rig.countdown_ms = -9_000 - 100 * i32::from(k);
         let up = 280.0 - 21.5 * t;
         rig.state_in_space([18.0 - 1.8 * t, -12.0 + 1.1 * t, up], [-1.8, 1.1, -21.5], (200.0, 4.0));
         rig.actuators(0);
@@ -110,7 +108,6 @@ pub(crate) fn flying(until: TdPhase) -> Rig {
     rig.phase = TdPhase::TD_PHASE_POWERED;
     for k in 0..20_u16 {
         let t = f32::from(k) * 0.1;
-        rig.countdown_ms = -18_000 - 100 * i32::from(k);
         let up = 30.0 - 14.0 * t;
         rig.state_in_space([1.8 - 0.6 * t, -1.1 + 0.4 * t, up], [-0.6, 0.4, -14.0], (200.0, 4.0));
         rig.actuators(-310);

@@ -9,9 +9,11 @@ mod sheet;
 
 use flight::vehicle::mission::StartPoint;
 use protocol::mission::MissionHash;
+use serde_json::{Value, json};
 use sim::recipe::{Recipe, RecipeError};
 use sim::world::wind::aloft::WindsAloft;
 
+use self::range_safety::{in_winds, limit_m_s};
 pub use self::sheet::escaped;
 use crate::frame::{Frame, FrameError, changed};
 use crate::hazard::{self, Flights, Impact, Rule, landed_as_planned};
@@ -91,6 +93,26 @@ impl Card {
             flights,
             rule: Rule::of(&calmest.mission),
             wind_from_deg: wind_from_deg.or(aloft.map(WindsAloft::from_deg)),
+        })
+    }
+
+    /// The numbers of the card as JSON.
+    pub fn json(&self) -> Value {
+        let judged = in_winds(&self.flown, &self.rule);
+        let winds = self.flown.iter().zip(&judged).map(|((wind_m_s, impacts), judged)| {
+            let mut wind = hazard::json(*wind_m_s, impacts, &self.rule);
+            // As on the card: never less than in less wind.
+            wind["nobody_within_m"] = json!(judged.circle.map(|circle| circle.exclusion_m));
+            wind
+        });
+        let masses = self.masses.iter().map(
+            |(kg, landed)| json!({ "kg": kg, "flights": landed.stands.of, "stand": landed.stands.count }),
+        );
+        json!({
+            "mission": self.recipe.mission.name, "hash": self.hash(), "start": self.start.name(),
+            "dispersion": self.recipe.dispersion_name, "seed": self.recipe.seed,
+            "limit_m_s": limit_m_s(&judged), "rule_m": self.rule.distance_m(),
+            "winds": winds.collect::<Vec<_>>(), "masses": masses.collect::<Vec<_>>(),
         })
     }
 

@@ -7,6 +7,8 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::launch::Launch;
 use flight::vehicle::mission::{Mission, StartPoint};
 
+use protocol::motion::Degrees;
+
 use super::sheet::words_of;
 use crate::hazard::{Case, Impact, Radius, Rule, exclusion_m, landed_as_planned, lift_off_kg, widest};
 use crate::statistics::Landings;
@@ -136,15 +138,20 @@ const LINE: f64 = 84.0;
 /// two names of four circles overlap.
 const NAMED: [[f64; 2]; 4] = [[0.0, 1.0], [0.0, -1.0], [0.71, 0.71], [0.71, -0.71]];
 
+/// Dashes of the circles in turn, so that they differ without colour.
+const DASHES: [&str; 4] = ["none", "7 2", "2 2", "7 2 2 2"];
+
 /// The circles of the permitted winds from above, to scale, with the line downwind. `wind_from_deg`
 /// is the direction of the wind, clockwise from north, which is up then; without it up is downwind.
 /// `None` without a circle.
 ///
-/// The lines of the field, as points north and east, m, are drawn where north is known.
+/// The lines of the field, as points north and east, m, are drawn where north is known. The position
+/// of the pad is written beside.
 pub fn plan(
     winds: &[InWind],
     wind_from_deg: Option<f64>,
     field: &[(&str, Vec<(f64, f64)>)],
+    pad: Degrees,
 ) -> Option<String> {
     let limit_m_s = limit_m_s(winds)?;
     let may_fly = winds.iter().filter(|wind| wind.wind_m_s <= limit_m_s);
@@ -171,7 +178,8 @@ pub fn plan(
     }
     for (place, (wind_m_s, circle)) in circles.iter().enumerate() {
         let radius = scale * circle.exclusion_m;
-        let _ = write!(lines, "<circle r=\"{radius:.1}\"/>");
+        let dashes = DASHES[place % DASHES.len()];
+        let _ = write!(lines, "<circle r=\"{radius:.1}\" stroke-dasharray=\"{dashes}\"/>");
         let [x, y] = at(-scale * circle.crew_m() - 1.0, 0.0);
         let _ = write!(lines, "<circle class=\"crew\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2\"/>");
         let [along, right] = NAMED[place % NAMED.len()].map(|share| (radius + 2.0) * share);
@@ -191,6 +199,9 @@ pub fn plan(
     names += &text(beyond(LINE, 20.0), "middle", "downwind");
     names += &text(beyond(-WIDEST - 3.0, 24.0), "middle", "launch crew");
     let [half_x, half_y] = HALF;
+    let Degrees { latitude, longitude } = pad;
+    let position = format!("pad {latitude:.5}, {longitude:.5}");
+    names += &text([2.0 - half_x, half_y - 8.0], "start", &position);
     if wind_from_deg.is_some() {
         let tip = [half_x - 8.0, 3.0 - half_y];
         names += &text([tip[0], tip[1] + 17.0], "middle", "N");

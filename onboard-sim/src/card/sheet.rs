@@ -238,7 +238,8 @@ impl Card {
     }
 
     fn places(&self, winds: &[InWind]) -> Section {
-        let plan = plan(winds, self.wind_from_deg, &crate::field::lines_m(&self.recipe));
+        let (lines_m, pad) = (crate::field::lines_m(&self.recipe), pad_of(&self.recipe.mission));
+        let plan = plan(winds, self.wind_from_deg, &lines_m, pad);
         let limit_m_s = limit_m_s(winds);
         let forbidden = winds.first().is_some_and(|wind| wind.wind_m_s > PERMITTED_M_S);
         let degrees = |turned_deg: f64| {

@@ -35,6 +35,9 @@ pub(crate) struct CardArguments {
     /// Folder of the card; one that exists is kept, and the card gets the next free name.
     #[arg(long, default_value = "card", value_name = "DIR")]
     out: PathBuf,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
 }
 
 pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
@@ -45,11 +48,16 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let card = on_threads(arguments.selection.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
-    let page = card.text();
+    let (page, json) = (card.text(), card.json());
     let (out, _held) = new_folder(&arguments.out)?;
     let [html, mission] = [card.html(), card.recipe.mission_toml];
     write_folder(&out, &[("card.html", &html), ("card.txt", &page), ("mission.toml", &mission)])?;
-    writeln!(std::io::stdout().lock(), "{page}card {}", out.join("card.html").display())?;
+    let mut stdout = std::io::stdout().lock();
+    if arguments.json {
+        writeln!(stdout, "{json:#}")?;
+    } else {
+        writeln!(stdout, "{page}card {}", out.join("card.html").display())?;
+    }
     Ok(Exit::Yes)
 }
 

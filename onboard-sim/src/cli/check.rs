@@ -44,6 +44,9 @@ pub(crate) struct CheckArguments {
     /// Parts to draw, CSV. Without a list mk3's own are drawn in mk3, and the mission's in others.
     #[arg(long, value_name = "FILE", requires = "svg")]
     parts: Option<PathBuf>,
+    /// Answer in JSON.
+    #[arg(long, conflicts_with = "svg")]
+    json: bool,
 }
 
 pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
@@ -54,7 +57,11 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let (flights, show) = (arguments.flights, show_flights());
     let progress = |done| show(done, flights as usize);
     let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &progress)?))?;
-    write!(std::io::stdout().lock(), "{page}")?;
+    if arguments.json {
+        writeln!(std::io::stdout().lock(), "{:#}", page.json())?;
+    } else {
+        write!(std::io::stdout().lock(), "{page}")?;
+    }
     let fits = arguments.svg.as_deref().map_or(Ok(true), |file| draw(arguments, &recipe.mission, file))?;
     Ok(Exit::of(fits && page.verdict() != Verdict::No))
 }

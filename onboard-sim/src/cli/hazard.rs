@@ -12,6 +12,7 @@ use onboard_sim::hazard::{
 };
 use onboard_sim::statistics::Landings;
 use protocol::program::{Exit, in_range};
+use serde_json::{Value, json};
 use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
 
@@ -38,6 +39,12 @@ pub(crate) struct HazardArguments {
     /// Write where each flight came down (CSV).
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Answer in JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write the answer into this file.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
@@ -50,7 +57,12 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let rule = Rule::of(mission);
     let wind = dispersion.wind_over_height();
     let study = Study { arguments, mission, cases: &cases, winds_m_s: &winds_m_s, wind, impacts: &impacts };
-    study.write_text(&rule, &mut std::io::stdout().lock())?;
+    let mut answer = Vec::new();
+    if arguments.json { study.write_json(&rule, &mut answer) } else { study.write_text(&rule, &mut answer) }?;
+    match &arguments.out {
+        Some(path) => drop(NewFile::create(path)?.fill(|file| file.write_all(&answer))?),
+        None => std::io::stdout().lock().write_all(&answer)?,
+    }
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
         NewFile::create(path)?.fill(|file| file.write_all(&csv))?;
@@ -80,6 +92,18 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
+    fn write_json(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
+        let HazardArguments { selection: Selection { dispersion, seed, .. }, .. } = self.arguments;
+        let in_wind = |(wind_m_s, impacts): (&f64, &Vec<Impact>)| hazard::json(*wind_m_s, impacts, rule);
+        let winds: Vec<Value> = self.winds_m_s.iter().zip(self.impacts).map(in_wind).collect();
+        let Mission { name, start, gate, .. } = self.mission;
+        let answer = json!({
+            "mission": name, "start": start.at.name(), "dispersion": dispersion, "seed": seed, "winds": winds,
+            "rule_m": rule.distance_m(), "fence_m": gate.fence_radius_m,
+        });
+        writeln!(out, "{answer:#}")
+    }
+
     fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
         let HazardArguments { selection: Selection { dispersion, seed, .. }, .. } = self.arguments;
         let (winds_m_s, wind) = (self.winds_m_s, &self.wind);

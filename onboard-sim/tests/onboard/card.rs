@@ -9,8 +9,11 @@ use onboard_sim::card::range_safety::{
 };
 use onboard_sim::hazard::{Case, Course, Flights, Impact, Rule, fly, lift_off_kg, studies};
 use proptest::prelude::*;
+use protocol::motion::Degrees;
 use sim::recipe::Recipe;
 use sim::sortie::Sortie;
+
+const PAD: Degrees = Degrees { latitude: 35.347_2, longitude: -117.808_6 };
 
 fn rule() -> Rule {
     Rule { feet: 200.0, impulse_n_s: 673.0, complex: true, model: false }
@@ -79,14 +82,14 @@ proptest! {
         let winds = in_winds(&flown, &rule());
         prop_assert!(winds.iter().all(|wind| wind.landed.is_none() && wind.circle.is_none()));
         prop_assert_eq!(limit_m_s(&winds), None);
-        prop_assert_eq!(plan(&winds, None, &[]), None);
+        prop_assert_eq!(plan(&winds, None, &[], PAD), None);
     }
 
     /// Wind from the west blows to the east: right, with north up.
     #[test]
     fn the_line_points_downwind_and_the_crew_stands_upwind_outside_for_every_direction(from_deg in 0.0..360.0_f64) {
         let winds = [circle(0.0, 110.0), circle(3.0, 310.0), circle(6.0, 610.0)];
-        let svg = plan(&winds, Some(from_deg), &[]).unwrap();
+        let svg = plan(&winds, Some(from_deg), &[], PAD).unwrap();
         let (sin, cos) = libm::sincos((from_deg + 180.0).to_radians());
         let document = roxmltree::Document::parse(&svg).unwrap();
         let number = |node: roxmltree::Node<'_, '_>, name| node.attribute(name).unwrap().parse::<f64>().unwrap();
@@ -120,10 +123,13 @@ fn every_circle_is_named_whatever_the_direction_of_the_wind() {
     for from_deg in (0..360).step_by(45) {
         let winds: Vec<_> =
             [(0.0, 110.0), (3.0, 250.0), (6.0, 390.0), (8.9, 450.0)].map(|(wind, m)| circle(wind, m)).into();
-        let svg = plan(&winds, Some(f64::from(from_deg)), &[]).unwrap();
+        let svg = plan(&winds, Some(f64::from(from_deg)), &[], PAD).unwrap();
         for name in [">0 m/s<", ">3 m/s<", ">6 m/s<", ">8.9 m/s<"] {
             assert!(svg.contains(name), "{name} from {from_deg}: {svg}");
         }
+        let dashes = ["none", "7 2", "2 2", "7 2 2 2"];
+        assert!(dashes.iter().all(|dashes| svg.contains(&format!("stroke-dasharray=\"{dashes}\""))), "{svg}");
+        assert!(svg.contains(">pad 35.34720, -117.80860<"), "{svg}");
     }
 }
 
@@ -132,12 +138,12 @@ fn every_circle_is_named_whatever_the_direction_of_the_wind() {
 #[test]
 fn val_compass_the_line_of_a_west_wind_points_east() {
     let winds = [circle(3.0, 310.0)];
-    let west = plan(&winds, Some(270.0), &[]).unwrap();
+    let west = plan(&winds, Some(270.0), &[], PAD).unwrap();
     let tip = |svg: &str| {
         svg.split("x2=").nth(1).unwrap().split("/>").next().unwrap().replace('"', "").replace("y2=", "")
     };
     assert!(tip(&west).starts_with("84.0 ") && west.contains(">N<"), "{west}");
-    let unknown = plan(&winds, None, &[]).unwrap();
+    let unknown = plan(&winds, None, &[], PAD).unwrap();
     assert_eq!(tip(&unknown), "0.0 -84.0");
     assert!(
         unknown.contains(">downwind<") && unknown.contains(">3 m/s<") && !unknown.contains(">N<"),

@@ -19,6 +19,11 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// The answer of a command with `--json`.
+fn json(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {}", stderr(output)))
+}
+
 fn names(directory: &Path) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(directory)
         .unwrap()
@@ -50,6 +55,10 @@ fn a_check_answers_with_its_worst_word_and_names_motors_that_cannot_be_used() {
     let mk3 = include_str!("../../flight/vehicles/missions/mk3.toml");
     fs::write(directory.path().join("heavy.toml"), mk3.replace("loaded_kg = 3.7", "loaded_kg = 5.0"))
         .unwrap();
+    let answer = json(&run(directory.path(), &[&["check", "mk3", "--json"], &none[..]].concat()));
+    let rows = answer["rows"].as_array().unwrap();
+    assert!(page.ends_with(&format!("\n{}\n", answer["verdict"].as_str().unwrap())), "{answer}");
+    assert!(rows.iter().all(|row| page.contains(row["found"].as_str().unwrap())), "{answer}");
     let heavy = run(directory.path(), &[&["check", "heavy.toml"], &none[..]].concat());
     assert_eq!(heavy.status.code(), Some(3), "{}", stderr(&heavy));
     let page = stdout(&heavy);
@@ -108,6 +117,12 @@ fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     assert!(stdout(&written).starts_with(&text));
     let html = fs::read_to_string(card.join("card.html")).unwrap();
     assert!(html.contains("<td>3.100 kg</td>") && html.ends_with("</html>\n"), "{html}");
+
+    let answer = json(&run(directory.path(), &[&arguments[..], &["--json", "--out", "json"]].concat()));
+    assert_eq!((answer["mission"].as_str(), answer["winds"][1]["flights"].as_u64()), (Some("mk2"), Some(2)));
+    assert!(text.contains(answer["hash"].as_str().unwrap()), "{answer}");
+    assert!(answer["winds"][1]["nobody_within_m"].is_null() && answer["limit_m_s"].is_null(), "{answer}");
+    assert_eq!(names(&directory.path().join("json")), names(&card));
 
     let stormy = [&["card", "--mission", "mk2", "--wind", "10", "--out", "stormy"], &few[..]].concat();
     let stormy = stdout(&run(directory.path(), &stormy));
@@ -189,6 +204,13 @@ fn the_impact_area_is_reported_with_set_flights_interval_and_rule() {
         "{}",
         stderr(&again)
     );
+    // The same in a file, and as JSON.
+    assert_eq!(stdout(&hazard(&["--out", "hazard.txt"])), "");
+    assert_eq!(fs::read_to_string(directory.path().join("hazard.txt")).unwrap(), text);
+    let answer = json(&hazard(&["--json"]));
+    let within_m = answer["winds"][1]["nobody_within_m"].as_f64().unwrap();
+    assert!(text.contains(&format!("4 m/s: nobody within {within_m:.0} m")), "{answer} {text}");
+    assert_eq!(answer["winds"][0]["cases"][0]["case"], "as planned");
     let kind = stdout(&hazard(&["--dispersion", "field"]));
     assert!(kind.contains("Set `field`, which may be kinder than `real`, seed 1"), "{kind}");
 }

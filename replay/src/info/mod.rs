@@ -11,13 +11,16 @@ pub(crate) use self::counts::RESET;
 pub use self::counts::{Channel, Frames, PhaseSource, PhaseSpan, PhaseTimeline, PlanningLatency, SolverWork};
 use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
+use avionics::link::telemetry;
+use flight::computer::findings::Findings;
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::from_toml;
 use mavlink::MessageData as _;
-use protocol::dialect::{MavMessage, TD_FINDING_DATA};
+use protocol::dialect::{MavMessage, TD_EVENTS_DATA, TD_FINDING_DATA, TdPhase};
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
+use protocol::reported::{FlightEvent, FlightEvents};
 use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
@@ -26,8 +29,8 @@ use crate::cli::{Answer, answer, give, give_each, warn_of_loss};
 use crate::controller::new_plan;
 use crate::findings::{self, Finding};
 use crate::log::{
-    Attachment, BuildComparison, Clocks, Cut, Entry, FlightLog, Head, Jump, LogError, Recording,
-    RecordingError, RecordingReader, StampedEntry, Verdict, frame_of,
+    Attachment, BuildComparison, Clock, ClockTime, Clocks, Cut, Entry, FlightLog, Head, Jump, LogError,
+    Recording, RecordingError, RecordingReader, StampedEntry, Verdict, frame_of,
 };
 use crate::print::{beyond, counted, messages_lost};
 use crate::recover::scan::Records;
@@ -49,17 +52,22 @@ fn run_again(path: &Path, mut info: Info) -> Info {
         return info;
     }
     let mut work = Vec::new();
-    let found = recorded(path).map_err(|error| error.to_string()).and_then(|(_, recording)| {
-        let again = findings::run_again(&recording, |computer, _, frame| {
-            let plan = new_plan(computer.pilot(), &frame.output);
-            work.extend(plan.map(|_| computer.pilot().report().iterations as f64));
-        });
-        findings::facts(&recording, again.and_then(|(_, findings)| findings))
+    let recording = match recorded(path) {
+        Ok((_, recording)) => recording,
+        Err(error) => {
+            info.set_findings(Err(error.to_string()));
+            return info;
+        }
+    };
+    let again = findings::run_again(&recording, |computer, _, frame| {
+        let plan = new_plan(computer.pilot(), &frame.output);
+        work.extend(plan.map(|_| computer.pilot().report().iterations as f64));
     });
-    if let Some(frames) = info.frames.as_mut().filter(|_| found.is_ok()) {
+    let again = again.and_then(|(_, findings)| findings);
+    if let Some(frames) = info.frames.as_mut().filter(|_| again.is_ok()) {
         frames.solver_work = SolverWork::of(work);
     }
-    info.set_findings(found);
+    info.note_again(&recording, again);
     info
 }
 
@@ -99,10 +107,11 @@ pub fn info_of<R: Read>(log: &mut FlightLog<R>) -> Result<Info, LogError> {
     Ok(seen.into_info(log))
 }
 
-/// Whether a raw frame holds TD_FINDING, by its header.
-fn is_finding(frame: &[u8]) -> bool {
-    let id = TD_FINDING_DATA::ID.to_le_bytes();
-    frame.first() == Some(&mavlink::MAV_STX_V2) && frame.get(7..10) == Some(&id[..3])
+/// Whether a raw frame holds TD_FINDING or TD_EVENTS, by its header.
+fn is_of_interest(frame: &[u8]) -> bool {
+    let ids = [TD_FINDING_DATA::ID, TD_EVENTS_DATA::ID].map(u32::to_le_bytes);
+    let is_one = |found: &[u8]| ids.iter().any(|id| *found == id[..3]);
+    frame.first() == Some(&mavlink::MAV_STX_V2) && frame.get(7..10).is_some_and(is_one)
 }
 
 /// What was seen while the log was read.
@@ -121,6 +130,7 @@ struct Seen {
     warned: bool,
     /// The finding that the vehicle has sent last.
     finding: Option<TD_FINDING_DATA>,
+    events: FlightEvents,
 }
 
 impl Seen {
@@ -130,6 +140,7 @@ impl Seen {
             // The last verdict is shown: phases and outcome are of the same flight.
             (self.vehicle_phases, self.finding) = (PhaseTracker::default(), None);
             (self.ending, self.flights) = (EndingTracker::default(), flights);
+            self.events = FlightEvents::default();
         }
         self.channels.count(stamped);
         let at_ns = stamped.log_time_ns;
@@ -151,10 +162,11 @@ impl Seen {
             Entry::Event(event) if log.clocks.flight_zero_s.is_none() => {
                 self.warned |= findings::is_warning(event);
             }
-            Entry::RawFrame if is_finding(&stamped.data) => {
-                let message = frame_of(&stamped.data).and_then(|frame| frame.decode().ok());
-                if let Some(MavMessage::TD_FINDING(finding)) = message {
-                    self.finding = Some(finding);
+            Entry::RawFrame if is_of_interest(&stamped.data) => {
+                match frame_of(&stamped.data).and_then(|frame| frame.decode().ok()) {
+                    Some(MavMessage::TD_FINDING(finding)) => self.finding = Some(finding),
+                    Some(MavMessage::TD_EVENTS(events)) => self.events.take(&events),
+                    _ => {}
                 }
             }
             Entry::ComputerStart(_) => self.frames.start = true,
@@ -225,6 +237,7 @@ impl Seen {
             ending: ending.map(after_reset),
             verdict,
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
+            events: self.events.received,
             findings,
             not_looked_for: None,
             clocks: log.clocks,
@@ -261,6 +274,8 @@ pub struct Info {
     pub frames: Option<Frames>,
     /// The phases from each source that records them, the vehicle first.
     pub phases: Vec<PhaseTimeline>,
+    /// The events of the flight, as its computer reports them; none if it did not.
+    pub events: Vec<FlightEvent>,
     /// The landing verdict.
     pub verdict: Option<Verdict>,
     /// Greatest height that was estimated or received, m.
@@ -297,7 +312,26 @@ impl Info {
         Ok(())
     }
 
-    pub(crate) fn set_findings(&mut self, found: Result<Vec<Finding>, String>) {
+    /// The contact: as the vehicle reports it, else of its verdict.
+    pub(crate) fn contact(&self) -> Option<ClockTime> {
+        let event = self.events.iter().find(|event| event.phase == TdPhase::TD_PHASE_TOUCHDOWN);
+        let reported = event.map(|event| ClockTime { clock: Clock::Flight, time_s: event.at_s });
+        reported.or_else(|| self.verdict.as_ref().map(Verdict::contact))
+    }
+
+    /// Notes what a flight computer reports that was run again.
+    pub(crate) fn note_again(&mut self, recording: &Recording, again: Result<Findings, String>) {
+        if let Some(MavMessage::TD_EVENTS(data)) =
+            again.as_ref().ok().and_then(|again| telemetry::events(again.events(), 0))
+        {
+            let mut events = FlightEvents::default();
+            events.take(&data);
+            self.events = events.received;
+        }
+        self.set_findings(findings::facts(recording, again));
+    }
+
+    fn set_findings(&mut self, found: Result<Vec<Finding>, String>) {
         match found {
             Ok(findings) => self.findings = Some(findings),
             // Those that the vehicle sent remain.
@@ -448,6 +482,7 @@ impl Answer for Info {
         let size = self.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
         let mut rows = self.ending();
         rows.extend(self.phases.first().map(|timeline| ("phases", phases(timeline))));
+        rows.extend(self.clocks.flight_zero_s.map(|_| ("events", self.events())));
         rows.push(("grade", format!("{}: {}", self.grade.level.name(), self.grade.reason)));
         rows.push(("complete", self.completeness()));
         let flights = self.completeness.flights;
@@ -485,8 +520,8 @@ type Row = (&'static str, String);
 impl Info {
     /// How it ended, what was broken, and what went wrong.
     fn ending(&self) -> Vec<Row> {
-        let touchdown = |verdict: &Verdict| format!("touchdown at {}", self.clocks.words(verdict.contact()));
-        let words = [self.ending.clone(), self.verdict.as_ref().map(touchdown)];
+        let touchdown = |contact| format!("touchdown at {}", self.clocks.words(contact));
+        let words = [self.ending.clone(), self.verdict.as_ref().and(self.contact()).map(touchdown)];
         let words: Vec<String> = words.into_iter().flatten().collect();
         let mut rows = Vec::new();
         if !words.is_empty() {
@@ -517,6 +552,15 @@ impl Info {
         let names = std::iter::once("findings").chain(std::iter::repeat(""));
         rows.extend(names.zip(found));
         rows
+    }
+
+    fn events(&self) -> String {
+        let words = |event: &FlightEvent| format!("{} {:.2} {:.1} m", event.name, event.at_s, event.height_m);
+        let words: Vec<String> = self.events.iter().map(words).collect();
+        match &words[..] {
+            [] => "not reported by the vehicle".to_owned(),
+            words => format!("{} (T+ in s and height, as the vehicle reports them)", words.join(", ")),
+        }
     }
 
     fn completeness(&self) -> String {

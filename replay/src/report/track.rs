@@ -11,9 +11,11 @@ use flight::guidance::powered::Plan;
 use flight::rules::phase::Phase;
 use flight::vehicle::rigid::RigidState;
 use nalgebra::UnitQuaternion;
+use protocol::dialect::TdPhase;
 use protocol::log::computer_v1::ComputerFrame;
 use protocol::log::flight_v1::{self as v1, TruthSample};
 use protocol::log::v1::Telemetry;
+use protocol::reported::FlightEvent;
 
 use crate::controller::new_plan;
 use crate::findings;
@@ -86,6 +88,8 @@ pub(super) struct Flight {
     /// Where the track comes from, in a sentence; `None` if there is none.
     pub(super) source: Option<&'static str>,
     pub(super) track: Vec<Sample>,
+    /// As its computer reports them; none if it did not.
+    pub(super) events: Vec<FlightEvent>,
     /// Command to the landing motor, vehicle time, s.
     pub(super) ignition_s: Option<f64>,
     /// Contact, vehicle time, s.
@@ -115,17 +119,21 @@ impl Flight {
         decisions.retain(|_| again.is_ok());
         let pilot = again.as_ref().ok().map(|(computer, _)| computer.pilot().clone());
         let found = again.and_then(|(_, findings)| findings);
-        info.set_findings(findings::facts(&recording, found));
+        info.note_again(&recording, found);
         let (source, track) = track(&recording, &decisions);
         let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
-        let ignited = pilot.as_ref().and_then(Pilot::ignited_at_s);
+        let is_ignition = |event: &&FlightEvent| event.phase == TdPhase::TD_PHASE_IGNITION;
+        let ignited = info.events.iter().find(is_ignition);
         let clocks = &recording.clocks;
         let heard_zero_s = || Some(clocks.flight_zero_s? - clocks.telemetry_zero_s?);
         let zero_s = if source == Some(RECEIVED) { heard_zero_s() } else { Some(0.0) };
         let found = || info.findings.iter().flatten();
         Self {
-            ignition_s: ignited.or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
+            ignition_s: ignited
+                .map(|event| event.at_s + zero_s.unwrap_or(0.0))
+                .or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
             touchdown_s: recording.contact_s(),
+            events: info.events.clone(),
             zero_s,
             signs: found().map(|finding| finding.since_s).collect(),
             shown: found().map(|finding| finding.picture).collect(),

@@ -92,6 +92,19 @@ fn tables_get_a_new_folder() {
     assert!(code == 0 && at("empty").join("events.csv").is_file(), "{stderr}");
 }
 
+/// Nothing is made of a name that asks for another format.
+#[test]
+fn tables_are_not_written_into_a_folder_that_is_named_as_a_file() {
+    let (directory, log) = copied(&WITH_FRAMES.log);
+    for name in ["flight.pdf", "flight.CSV", "flight.rrd"] {
+        let path = directory.path().join(name);
+        let (code, stdout, stderr) = run(replay("export", &log).arg("--out").arg(&path));
+        assert_eq!((code, stdout.as_str()), (2, ""), "{stderr}");
+        assert!(stderr.contains("cannot be written: a directory, .kml or .gpx is accepted"), "{stderr}");
+        assert!(!path.exists(), "{name}");
+    }
+}
+
 /// A page with the default name does not replace a page that was edited.
 #[test]
 fn a_report_twice_is_two_pages() {

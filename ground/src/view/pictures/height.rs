@@ -40,11 +40,12 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let apogee_m = of(|d| d.apogee_m);
     let band = of(|d| d.band_low_m).zip(of(|d| d.band_high_m)).filter(|_| lights);
     let commit_m = of(|d| d.commit_height_m).filter(|_| falls);
-    let ignition = model.history.timeline.iter().find(|(phase, _)| *phase == TdPhase::TD_PHASE_POWERED);
-    let burn_s = ignition.map(|(_, at)| seconds_since(*at, from));
+    let is_ignited = |(phase, _): &(TdPhase, Duration)| *phase == TdPhase::TD_PHASE_POWERED;
+    let ignited = model.history.timeline.iter().any(is_ignited);
+    let burn_at = vehicle.events.of(TdPhase::TD_PHASE_IGNITION).filter(|_| ignited);
     // The burn fills the picture: the flight before it is irrelevant to its end.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
-    let ignited_s = burn_s.map_or(present_s, |burn_s| burn_s.min(present_s));
+    let ignited_s = burn_at.map_or(present_s, |(burn_s, _)| burn_s.min(present_s));
     let begins_s = if burns { (ignited_s - 1.0).floor().max(0.0) } else { 0.0 };
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
@@ -85,7 +86,6 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
     let (label, predicted) = (theme.style(TextRole::Label), ink(Ink::Predicted));
-    let burn_at = burn_s.and_then(|burn_s| flown.iter().copied().find(|(at, _)| *at >= burn_s));
     let lands_at = to_come.last().filter(|(_, height_m)| *height_m < 1.0).map(|(at, _)| (*at, 0.0));
     let here = height_m.map(|height_m| (present_s, height_m.value.max(0.0)));
     let lost_at = predict_position(vehicle, now).map(|at| (present_s, at.altitude_m));
@@ -105,7 +105,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         vec![format!("{name}{height}{time}"), format!("{height}{time}"), height]
     };
     let rises = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
-    let top = highest.filter(|(at, _)| *at > 0.0);
+    let top = vehicle.events.of(TdPhase::TD_PHASE_DEPLOY).filter(|(at, _)| *at > 0.0);
     let labels = [
         lights_at.map(|at| ((since_s, at.1), words("ignition ", at), predicted)),
         band.filter(|_| lights_at.is_none()).map(|(low_m, high_m)| {
@@ -114,7 +114,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         }),
         commit_m.map(|m| ((since_s, m), vec![format!("commit {}", whole(m))], ink(Ink::Limit))),
         apogee_m.filter(|_| rises).map(|m| ((since_s, m), vec![format!("apogee {}", whole(m))], predicted)),
-        top.filter(|_| !rises).map(|at| (at, words("", at), label)),
+        top.map(|at| (at, words("", at), label)),
         burn_at.map(|at| (at, words("ignition ", at), label)),
     ];
     for (at, words, style) in labels.into_iter().flatten() {

@@ -6,15 +6,15 @@ mod telemetry;
 use std::time::Duration;
 
 use ground::key::Key;
-use ground::model::{KeyTiming, Model, Settings};
+use ground::model::{KeyTiming, Model, Settings, is_flight};
 use ground::update::{Action, Msg, update};
 use ground::view::draw;
 use ground::view::theme::{Palette, Theme};
 use protocol::command::CommandAnswer;
 use protocol::dialect::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavAutopilot, MavCmd, MavMessage, MavModeFlag, MavState, MavType,
-    TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock, TdLatch, TdMotor,
-    TdPhase, TdVehicleFlag,
+    TD_EVENTS_DATA, TD_FLIGHT_STATUS_DATA, TD_UPLINK_DATA, TdAbortEffect, TdCheck, TdHold, TdInterlock,
+    TdLatch, TdMotor, TdPhase, TdVehicleFlag,
 };
 use protocol::frame::{Encoder, Frame};
 use protocol::identity::{Address, GROUND, PHASE_BITS, VEHICLE};
@@ -62,6 +62,8 @@ pub(crate) struct Rig {
     /// When the vehicle was switched on.
     booted_at: Duration,
     encoder: Encoder,
+    /// The events so far, and the release.
+    flown: (TD_EVENTS_DATA, Duration),
 }
 
 impl Rig {
@@ -91,6 +93,7 @@ impl Rig {
             uplink_at: Duration::ZERO,
             booted_at: Duration::ZERO,
             encoder: Encoder::new(VEHICLE),
+            flown: Default::default(),
         }
     }
 
@@ -220,6 +223,7 @@ impl Rig {
     }
 
     pub(crate) fn flight_status(&mut self) {
+        self.time_the_flight();
         let status = TD_FLIGHT_STATUS_DATA {
             time_boot_ms: self.boot_ms(),
             countdown_ms: self.countdown_ms,
@@ -243,6 +247,32 @@ impl Rig {
             hold_left_s: if self.hold == TdHold::TD_HOLD_NONE { 0 } else { 42 },
         };
         self.receive(&MavMessage::TD_FLIGHT_STATUS(status));
+        self.flight_events();
+    }
+
+    /// The time since the release runs in flight.
+    fn time_the_flight(&mut self) {
+        let since = Duration::from_millis(self.countdown_ms.min(0).unsigned_abs().into());
+        if self.flown.0.entered == 0 {
+            self.flown.1 = self.now.saturating_sub(since);
+        }
+        if is_flight(self.phase) {
+            self.countdown_ms = -(self.now.saturating_sub(self.flown.1).as_millis() as i32);
+        }
+    }
+
+    /// The event of a new phase in flight, at the height that was sent last.
+    fn flight_events(&mut self) {
+        let (number, height) = (self.phase as usize, self.model.vehicle.height_m());
+        let (events, released_at) = &mut self.flown;
+        let place = number.checked_sub(TdPhase::TD_PHASE_BOOST as usize);
+        let (Some(place), 0) = (place, events.entered >> number & 1) else { return };
+        events.boot_number = self.boot_number;
+        events.at_ms[place] = self.now.saturating_sub(*released_at).as_millis() as u32;
+        events.height_m[place] = height.map_or(0.0, |height| height.value as f32);
+        events.entered |= 1 << number;
+        let message = MavMessage::TD_EVENTS(events.clone());
+        self.receive(&message);
     }
 
     /// The uplink report: while the vehicle receives this station, its last frame is 0.2 s old.

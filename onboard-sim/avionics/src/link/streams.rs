@@ -13,9 +13,10 @@ use protocol::dialect::{
     CURRENT_MODE_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, GLOBAL_POSITION_INT_DATA,
     GPS_RAW_INT_DATA, HEARTBEAT_DATA, HIGHRES_IMU_DATA, HOME_POSITION_DATA, LOCAL_POSITION_NED_DATA,
     MESSAGE_INTERVAL_DATA, MavMessage, MavResult, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
-    SYSTEM_TIME_DATA, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
-    TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
-    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TD_UPLINK_DATA, VFR_HUD_DATA,
+    SYSTEM_TIME_DATA, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_DESCENT_DATA, TD_EVENTS_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA,
+    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TD_UPLINK_DATA,
+    VFR_HUD_DATA,
 };
 use protocol::frame::SIGNATURE_LEN;
 use protocol::hub::line::SHARE;
@@ -543,6 +544,26 @@ impl FindingReporter {
         }
         self.due_s = now_s + SELDOM_S;
         Some(telemetry::finding(vehicle.findings, self.turn.next(found), vehicle.time_s, boot))
+    }
+}
+
+/// Reports the events of the flight: with each, and repeatedly.
+#[derive(Debug, Default)]
+pub(super) struct EventReporter {
+    entered: u16,
+    due_s: f64,
+}
+
+impl EventReporter {
+    /// The message to send now.
+    pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, boot: u32, now_s: f64) -> Option<MavMessage> {
+        let message = telemetry::events(vehicle.findings.events(), boot)?;
+        let MavMessage::TD_EVENTS(TD_EVENTS_DATA { entered, .. }) = message else { return None };
+        if now_s < self.due_s && entered == self.entered {
+            return None;
+        }
+        (self.entered, self.due_s) = (entered, now_s + SELDOM_S);
+        Some(message)
     }
 }
 

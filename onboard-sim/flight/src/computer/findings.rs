@@ -15,6 +15,7 @@ use alloc::vec::Vec;
 
 use nalgebra::Vector3;
 
+use super::events::FlightEvents;
 use super::pad_check::{SURFACE_NAMES, SURFACES, surfaces_rad};
 use super::{Computer, FRAME_S, SensedInput};
 use crate::control::servo::{GIMBALS, ServoModel};
@@ -160,9 +161,16 @@ pub struct Findings {
     watches: BTreeMap<Sign, SignWatch>,
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
+    /// What happened as intended, too.
+    events: FlightEvents,
 }
 
 impl Findings {
+    /// The events of the flight so far.
+    pub fn events(&self) -> &FlightEvents {
+        &self.events
+    }
+
     /// Thrust over weight when a foot first touched the ground in the landing burn.
     pub fn thrust_over_weight_at_contact(&self) -> Option<f64> {
         self.thrust_over_weight
@@ -171,6 +179,10 @@ impl Findings {
     /// Looks at the computer after a frame.
     pub fn note(&mut self, computer: &Computer) {
         let Some((flown, estimate)) = computer.flown().zip(computer.pilot().estimate()) else { return };
+        if let Some(released_at_s) = computer.released_at_s() {
+            let height_m = computer.pilot().feet_height_m(estimate);
+            self.events.note(computer.mode(), released_at_s, &flown, height_m);
+        }
         self.watcher.take(computer, &flown, estimate);
         if flown.contact && computer.pilot().ignited_at_s().is_some() && self.thrust_over_weight.is_none() {
             let (thrust_n, weight_n) = computer.pilot().thrust_and_weight_n(flown.time_s);
@@ -332,7 +344,7 @@ const JUMP: [f64; SENSORS.len()] = [3.6, 8.0, 4.0, 10.0, 1.0];
 const JUMP_UNITS: [&str; SENSORS.len()] = ["m/s2", "deg/s", "m", "m", "m"];
 const GYRO_JUMP_IN_BURN_DEG_S: f64 = 25.0;
 /// Height below which legs touch the ground, m.
-const LEGS_M: f64 = 1.0;
+pub(super) const LEGS_M: f64 = 1.0;
 /// Longest time between two samples that are compared, s: inertial unit, barometer and lidar; GNSS.
 const NEXT_SAMPLE_S: f64 = 0.1;
 const NEXT_FIX_S: f64 = 0.5;

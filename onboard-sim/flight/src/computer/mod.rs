@@ -7,6 +7,7 @@
 //!
 //! * [`table`]: applies each event to the phase table once, and predicts the effect of an abort.
 //! * [`crew`]: the crew's requests and the decision on each.
+//! * [`events`]: the events of a flight.
 //! * [`findings`]: faults detected in flight.
 //! * [`messages`]: messages to the crew.
 //! * [`pad_check`]: the vehicle check that the crew runs on the pad.
@@ -17,6 +18,7 @@
 
 pub mod crew;
 mod digest;
+pub mod events;
 pub mod findings;
 pub mod messages;
 pub mod pad;

@@ -51,17 +51,17 @@ fn verdict(flight: &Flight, info: &Info) -> String {
     if let Some(first) = info.findings.iter().flatten().next() {
         words.extend([format!("First sign: {}, at {:.2}. ", first.words, first.since())]);
     }
-    words += &info.verdict.as_ref().map_or_else(
+    words += &info.verdict.as_ref().and(info.contact()).map_or_else(
         || {
             "The vehicle did not touch down while it was recorded, or its verdict was not recorded."
                 .to_owned()
         },
-        |verdict| {
+        |contact| {
             let far = |[north_m, east_m, ..]: State| {
                 format!(", {:.1} m from the pad", libm::hypot(north_m, east_m))
             };
             let far = flight.contact().map_or_else(String::new, far);
-            format!("Touchdown at {}{far}.", info.clocks.words(verdict.contact()))
+            format!("Touchdown at {}{far}.", info.clocks.words(contact))
         },
     );
     let position = geo_link(flight).unwrap_or_default();

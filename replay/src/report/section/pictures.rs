@@ -7,13 +7,13 @@ use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::rigid::RigidState;
 use protocol::log::flight_v1::AidStatus;
 
-use super::place::moments;
+use super::place::{Moment, moments};
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
 use crate::report::chart::{Chart, TIME, line};
 use crate::report::track::Part::{Air, Burn, Whole};
-use crate::report::track::{Decision, Flight, Part, Sample, Series, planned};
+use crate::report::track::{Decision, Flight, Part, Series, planned};
 
 /// As much of a crew's note as stands beside its mark; the events have all of it.
 const NOTE_LETTERS: usize = 40;
@@ -90,10 +90,9 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
         .line("flown", "a", flight.flown(|state| state[HEIGHT]))
         .line(PLANNED, "b", flight.planned_first(|state| state[HEIGHT]));
-    let shown = moments(flight).into_iter().filter(|(name, _)| ["apogee", "ignition"].contains(name));
-    let place = |(name, sample): (&str, &Sample)| {
-        let height_m = sample.state[HEIGHT];
-        (flight.axis_s(sample.time_s), height_m, "place", format!("{name} {height_m:.0} m"))
+    let shown = moments(flight).into_iter().filter(|moment| ["apogee", "ignition"].contains(&moment.name));
+    let place = |Moment { name, at_s, height_m, .. }: Moment| {
+        (at_s, height_m, "place", format!("{name} {height_m:.0} m"))
     };
     (height.chart.places, height.chart.named, height.chart.size_px) =
         (shown.map(place).collect(), true, Some((640.0, 130.0)));

@@ -42,7 +42,7 @@ use self::requests::{Answered, Refusals, Waiting, Warnings};
 use crate::link::commands::Command;
 pub use crate::link::stations::Path;
 use crate::link::stations::{Sender, Stations};
-use crate::link::streams::{CheckReporter, FindingReporter, HURRIED_S, Streams};
+use crate::link::streams::{CheckReporter, EventReporter, FindingReporter, HURRIED_S, Streams};
 use crate::link::vehicle::{Identity, VehicleKind, VehicleState};
 use crate::link::{commands, telemetry};
 
@@ -86,6 +86,7 @@ pub struct VehicleEndpoint {
     files: FileService,
     check_reporter: CheckReporter,
     finding_reporter: FindingReporter,
+    event_reporter: EventReporter,
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -160,6 +161,7 @@ impl VehicleEndpoint {
             files: FileService::default(),
             check_reporter: CheckReporter::default(),
             finding_reporter: FindingReporter::default(),
+            event_reporter: EventReporter::default(),
         }
     }
 
@@ -310,6 +312,7 @@ impl VehicleEndpoint {
         }
         let in_turn = [
             self.check_reporter.due(vehicle, boot, self.now_s),
+            self.event_reporter.due(vehicle, boot, self.now_s),
             self.finding_reporter.due(vehicle, boot, self.now_s),
         ];
         for message in in_turn.into_iter().flatten() {

@@ -26,13 +26,14 @@ use protocol::dialect::{
     MavModeFlag, MavModeProperty, MavProtocolCapability, MavStandardMode, MavState, MavSysStatusSensor,
     MavSysStatusSensorExtended, MavType, MavVtolState, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
     SYSTEM_TIME_DATA, StorageStatus, StorageType, StorageUsageFlag, TD_CONTROLLER_DATA, TD_CREW_DATA,
-    TD_DESCENT_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA,
-    TD_TOUCHDOWN_PREDICTION_DATA, TdCheck, VFR_HUD_DATA,
+    TD_DESCENT_DATA, TD_EVENTS_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA,
+    TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PREDICTED_PATH_DATA,
+    TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdCheck, VFR_HUD_DATA,
 };
 use protocol::identity::{GIT_COMMIT, PHASE_BITS};
 use protocol::mission::MissionHash;
 
+pub use self::ours::events;
 pub(crate) use self::ours::{finding, pad_check};
 use crate::link::vehicle::{BatteryFacts, Identity, VehicleKind, VehicleState};
 
@@ -66,6 +67,7 @@ pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) ->
         TD_OPERATOR_DATA::ID => ours::operator(state, boot),
         // It matters before the flight only, and there it costs no position.
         TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state, boot)),
+        TD_EVENTS_DATA::ID => ours::events(state.findings.events(), boot),
         TD_DESCENT_DATA::ID => motion::descent(state, boot),
         ESTIMATOR_STATUS_DATA::ID => motion::estimator(state),
         HIGHRES_IMU_DATA::ID => Some(motion::imu(state)),

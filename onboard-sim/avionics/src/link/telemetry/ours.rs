@@ -3,19 +3,20 @@
 
 use flight::computer::AbortEffect;
 use flight::computer::crew::People;
+use flight::computer::events::FlightEvents;
 use flight::computer::findings::Findings;
 use flight::computer::pad_check::{CheckedValue, PadCheck};
 use flight::computer::pilot::planner::PLAN_WITHIN_S;
 use flight::rules::operator::Operator;
-use flight::rules::phase::Mode;
+use flight::rules::phase::{Mode, Phase};
 use flight::rules::verdict::LandingVerdict;
 use mavlink::types::CharArray;
 use num_traits::FromPrimitive;
 use protocol::dialect::{
-    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_FINDING_DATA, TD_FINS_DATA, TD_FLIGHT_STATUS_DATA,
-    TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA, TD_PAD_CHECK_DATA,
-    TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA, TdAbortEffect, TdCheck,
-    TdInterlock, TdLanding, TdLimit, TdPadCheckItem, TdVehicleFlag,
+    MavMessage, TD_CONTROLLER_DATA, TD_CREW_DATA, TD_EVENTS_DATA, TD_FINDING_DATA, TD_FINS_DATA,
+    TD_FLIGHT_STATUS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA, TD_OPERATOR_DATA,
+    TD_PAD_CHECK_DATA, TD_PREDICTED_PATH_DATA, TD_TOUCHDOWN_LIMITS_DATA, TD_TOUCHDOWN_PREDICTION_DATA,
+    TdAbortEffect, TdCheck, TdInterlock, TdLanding, TdLimit, TdPadCheckItem, TdVehicleFlag,
 };
 
 use super::{boot_ms, centidegrees, centimetres, characters};
@@ -251,6 +252,20 @@ pub(crate) fn finding(findings: &Findings, place: usize, time_s: f64, boot_numbe
         data.text = characters(&finding.words());
     }
     MavMessage::TD_FINDING(data)
+}
+
+/// The events of the flight so far; `None` before the first.
+pub fn events(events: &FlightEvents, boot_number: u32) -> Option<MavMessage> {
+    let mut data = TD_EVENTS_DATA { boot_number, ..TD_EVENTS_DATA::default() };
+    for phase in Phase::ALL {
+        let place = phase.index().checked_sub(Phase::Boost.index());
+        if let Some((place, (at_s, height_m))) = place.zip(events.of(phase)) {
+            data.at_ms[usize::from(place)] = boot_ms(at_s);
+            data.height_m[usize::from(place)] = height_m as f32;
+            data.entered |= 1 << phase.index();
+        }
+    }
+    (data.entered > 0).then_some(MavMessage::TD_EVENTS(data))
 }
 
 // The last check of the vehicle on its pad, value by value.
