@@ -222,6 +222,8 @@ impl Flights {
 pub(crate) struct Sequences {
     channels: BTreeMap<u16, Numbers>,
     last: Option<u32>,
+    /// The first number of a channel, the smallest of all: writers count from 0 or from 1.
+    first: Option<u32>,
     each_has_its_counter: bool,
     /// Records that are missing, if all share a counter.
     missing: u32,
@@ -242,7 +244,9 @@ impl Sequences {
     /// channel: of it, or of all that share the counter.
     pub(crate) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
         self.each_has_its_counter |= self.last.is_some_and(|last| sequence <= last);
-        let of_all = self.last.map_or(0, |last| last.saturating_add(1));
+        self.first = Some(self.first.map_or(sequence, |first| first.min(sequence)));
+        let first = self.from();
+        let of_all = self.last.map_or(first, |last| last.saturating_add(1));
         self.missing = self.missing.saturating_add(sequence.saturating_sub(of_all));
         self.last = Some(sequence);
         let numbers = self.channels.entry(channel).or_default();
@@ -254,17 +258,26 @@ impl Sequences {
             records: before.records + 1,
         };
         if self.each_has_its_counter {
-            sequence.saturating_sub(before.next)
+            sequence.saturating_sub(before.next.max(first))
         } else {
             self.missing - before.missing
         }
+    }
+
+    /// The number from which the writer counts.
+    fn from(&self) -> u32 {
+        u32::from(self.first == Some(1))
     }
 
     /// The number of missing records of a channel that has its counter.
     pub(crate) fn lost_of(&self, channel: u16) -> u64 {
         let Numbers { highest, records, .. } = self.channels.get(&channel).copied().unwrap_or_default();
         // A writer without numbering leaves 0 everywhere.
-        let numbered = if highest == 0 || self.is_shared() { 0 } else { u64::from(highest) + 1 };
+        let numbered = if highest == 0 || self.is_shared() {
+            0
+        } else {
+            u64::from(highest) + 1 - u64::from(self.from())
+        };
         numbered.saturating_sub(records)
     }
 
@@ -344,6 +357,10 @@ mod tests {
         assert_eq!(lost(&[(1, 0), (2, 1), (2, 3), (1, 4), (2, 5)]), (vec![0, 0, 1, 1, 0], 1));
         assert_eq!(lost(&[(1, 0), (2, 0), (1, 0)]), (vec![0, 0, 0], 0));
         assert_eq!(lost(&[(1, 7), (1, 8)]), (vec![7, 0], 7));
+        // From 1, each channel or all together; then a channel of a counter from 0 that lost its first.
+        assert_eq!(lost(&[(1, 1), (2, 1), (1, 2), (2, 3)]), (vec![0, 0, 0, 1], 1));
+        assert_eq!(lost(&[(1, 1), (2, 2), (1, 4)]), (vec![0, 0, 1], 1));
+        assert_eq!(lost(&[(1, 1), (2, 0), (2, 1)]), (vec![0, 0, 0], 1));
     }
 
     #[test]
