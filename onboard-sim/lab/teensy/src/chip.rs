@@ -19,6 +19,7 @@ use embedded_hal::spi::{self, SpiDevice};
 use embedded_io::{Read, ReadReady};
 use embedded_sdmmc::SdCard;
 use flight::computer::LogState;
+use flight::computer::crew::Requests;
 use flight::computer::messages::CrewMessage;
 use flight::computer::pilot::planner::Planner;
 use flight::rules::arming::Uplink;
@@ -279,7 +280,7 @@ impl Chip for StandInChip {
     }
 
     fn uplink_state(&mut self) -> UplinkState {
-        UplinkState { uplink: Uplink::NeverReceived, commander: None, requests: alloc::vec::Vec::new() }
+        UplinkState { uplink: Uplink::NeverReceived, commander: None, requests: Requests::new() }
     }
 
     fn send(&mut self, messages: &[CrewMessage]) {

@@ -11,7 +11,7 @@ use avionics::log::again::RecordedComputer;
 use avionics::log::frame::start_to_log;
 use embedded_hal::{digital, i2c, pwm, spi};
 use flight::computer::FRAME_MS;
-use flight::computer::crew::{CrewCommand, Request};
+use flight::computer::crew::{CrewCommand, Request, Requests};
 use flight::computer::pad_check::CheckState;
 use flight::estimation::estimator::{FixQuality, GRAVITY_M_S2};
 use flight::rules::arming::Uplink;
@@ -280,7 +280,7 @@ pub(crate) struct Bench {
     actuators: Actuators,
     outputs: [bool; 5],
     pin_out: bool,
-    requests: Vec<Request>,
+    requests: Requests,
     submitted: Option<(u64, Box<Planner>)>,
     pub(crate) log: Vec<(u64, Vec<u8>)>,
     slots: [Vec<u8>; 2],
@@ -321,7 +321,7 @@ impl Bench {
             actuators: Actuators::NONE,
             outputs: [false; 5],
             pin_out: false,
-            requests: Vec::new(),
+            requests: Requests::new(),
             submitted: None,
             log: Vec::new(),
             slots: [Vec::new(), Vec::new()],

@@ -127,7 +127,9 @@ impl VehicleEndpoint {
         {
             return;
         }
-        self.waiting.push(Waiting { path, command: *command, request });
+        // One frame decides the first few: aborts come first.
+        let place = if crew_command == CrewCommand::Abort { aborts } else { self.waiting.len() };
+        self.waiting.insert(place, Waiting { path, command: *command, request });
     }
 
     /// Uplink state for the vehicle's next frame, with the crew's requests.
