@@ -155,7 +155,7 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, impl Fn(f32) -
         I::TD_PAD_CHECK_ITEM_ACCELEROMETER_NOISE => ("m/s2", 1.0, 3),
         I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE | I::TD_PAD_CHECK_ITEM_LIDAR_RANGE => ("m", 1.0, 2),
         I::TD_PAD_CHECK_ITEM_GNSS_SPEED => ("m/s", 1.0, 2),
-        I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => ("V", 1.0, 2),
+        I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE | I::TD_PAD_CHECK_ITEM_SERVO_BATTERY_VOLTAGE => ("V", 1.0, 2),
         I::TD_PAD_CHECK_ITEM_LOG_SPACE => ("MiB", MIB, 0),
         _ => ("", 1.0, 0),
     };
@@ -165,6 +165,7 @@ pub fn shown(value: &TD_PAD_CHECK_DATA) -> (String, &'static str, impl Fn(f32) -
         I::TD_PAD_CHECK_ITEM_BAROMETER_NOISE => "baro noise".to_owned(),
         I::TD_PAD_CHECK_ITEM_IGNITER_CONTINUITY => "igniter wire".to_owned(),
         I::TD_PAD_CHECK_ITEM_BATTERY_VOLTAGE => "battery".to_owned(),
+        I::TD_PAD_CHECK_ITEM_SERVO_BATTERY_VOLTAGE => "servo batt.".to_owned(),
         I::TD_PAD_CHECK_ITEM_GNSS_FIXES => "GNSS fixes".to_owned(),
         I::TD_PAD_CHECK_ITEM_GNSS_SPEED => "GNSS speed".to_owned(),
         item => words::lower_case(&item, "TD_PAD_CHECK_ITEM_"),

@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use mavlink::MessageData;
 use protocol::dialect::{
-    HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor, STORAGE_INFORMATION_DATA,
-    SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA, TD_MISSION_DATA,
-    TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
+    BATTERY_STATUS_DATA, HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
+    STORAGE_INFORMATION_DATA, SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
+    TD_MISSION_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
 };
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
 pub use protocol::reported::{phase_from_number, phase_of};
 
+use super::words::fixed;
 use super::{
     Attitude, Battery, Deflection, FlownMission, Gimbal, Heartbeat, Motion, PadCheck, Prediction, Sample,
     Touchdown, Vehicle, Verdict, extend_path, is_on_pad, may_be_ours,
@@ -125,6 +126,14 @@ impl Vehicle {
             volts: f64::from(data.voltage_battery) / 1e3,
             percent: u8::try_from(data.battery_remaining).ok(),
         }))
+    }
+
+    /// The voltage of its battery, and that of its servos' if it reports one.
+    pub(crate) fn volts(&self) -> Option<String> {
+        let volts = self.battery()?.value.volts;
+        let servos = self.converted(|data: &BATTERY_STATUS_DATA| f64::from(data.voltages[0]) / 1e3);
+        let one = || format!("{} V", fixed(volts, 2));
+        Some(servos.map_or_else(one, |servos| format!("{}/{} V", fixed(volts, 1), fixed(servos.value, 1))))
     }
 
     /// Whether it reports that its log does not run.

@@ -201,6 +201,10 @@ impl Vehicle {
     }
 
     pub(super) fn store(&mut self, message: &MavMessage, now: Duration) {
+        // SYS_STATUS has the flight computer's battery.
+        if matches!(message, MavMessage::BATTERY_STATUS(data) if data.id == 0) {
+            return;
+        }
         let mut payload = [0; 255];
         let len = message.ser(MavlinkVersion::V2, &mut payload);
         self.payloads.insert(message.message_id(), Sample::new(payload[..len].to_vec(), now));

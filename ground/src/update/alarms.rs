@@ -268,7 +268,8 @@ fn battery(model: &Model) -> Option<String> {
     // A charge above half is an estimate that the voltage contradicts.
     let left = battery.percent.filter(|percent| *percent <= 50);
     let left = left.map_or_else(String::new, |percent| format!(", {percent} % left"));
-    (refuses || empty).then(|| format!("BATTERY LOW: {:.2} V{left}", battery.volts))
+    let volts = model.vehicle.volts()?;
+    (refuses || empty).then(|| format!("BATTERY LOW: {volts}{left}"))
 }
 
 /// A position without satellites drifts. On the pad it is a failing check. On the way up it is

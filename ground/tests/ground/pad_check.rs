@@ -6,9 +6,9 @@ use ground::key::Key;
 use ground::model::{AlarmKind, LOSS_MOST, Model, Page, Role};
 use ground::update::Action;
 use protocol::dialect::{
-    COMMAND_LONG_DATA, MavCmd, MavMessage, RADIO_STATUS_DATA, STORAGE_INFORMATION_DATA, SYS_STATUS_DATA,
-    TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdCheck, TdPadCheckItem as Item, TdPadCheckState as State,
-    TdPadCheckVerdict as Verdict, TdPhase,
+    BATTERY_STATUS_DATA, COMMAND_LONG_DATA, MavCmd, MavMessage, RADIO_STATUS_DATA, STORAGE_INFORMATION_DATA,
+    SYS_STATUS_DATA, TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdCheck, TdPadCheckItem as Item,
+    TdPadCheckState as State, TdPadCheckVerdict as Verdict, TdPhase,
 };
 use protocol::identity::{Address, GROUND};
 
@@ -227,6 +227,14 @@ fn a_low_battery_and_a_full_storage_are_alarms_outside_a_check_too() {
     assert_eq!(text, "VEHICLE LOG has too little space: 40 MiB");
     rig.key(Key::Char(' '));
     rig.expect_screen("BATTERY LOW: 7.31 V, 20 % left");
+    for (id, millivolts) in [(1, 11_040), (0, 7_310)] {
+        let mut voltages = [u16::MAX; 10];
+        voltages[0] = millivolts;
+        let pack = BATTERY_STATUS_DATA { id, voltages, ..BATTERY_STATUS_DATA::default() };
+        rig.receive(&MavMessage::BATTERY_STATUS(pack));
+    }
+    rig.run(0.5);
+    rig.expect_screen("BATTERY LOW: 7.3/11.0 V, 20 % left");
     // In the air by what is left.
     (rig.checks_failed, rig.phase) = (0, TdPhase::TD_PHASE_AERO_DESCENT);
     rig.run(0.5);

@@ -87,7 +87,7 @@ pub fn supply(model: &Model, theme: Theme) -> Line<'static> {
     let not_reported = || "not reported".to_owned();
     let battery = model.vehicle.battery().map_or_else(not_reported, |battery| {
         let left = battery.value.percent.map_or_else(String::new, |percent| format!(", {percent} %"));
-        format!("{} V{left}", fixed(battery.value.volts, 2))
+        format!("{}{left}", model.vehicle.volts().unwrap_or_default())
     });
     let free = |space: Sample<f64>| format!("{} MiB free", fixed(space.value, 0));
     let space = model.vehicle.log_space_mib().map_or_else(not_reported, free);

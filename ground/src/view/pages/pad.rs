@@ -284,9 +284,7 @@ fn about(vehicle: &Vehicle, check: TdCheck) -> (String, &'static str) {
         }
         TdCheck::TD_CHECK_UPLINK => unseen("not alive"),
         TdCheck::TD_CHECK_HEIGHT => unseen("too low"),
-        TdCheck::TD_CHECK_BATTERY => {
-            (number(vehicle.battery().map(|battery| battery.value.volts), 2, "V"), "too low")
-        }
+        TdCheck::TD_CHECK_BATTERY => (vehicle.volts().unwrap_or_default(), "too low"),
         _ => unseen(""),
     }
 }

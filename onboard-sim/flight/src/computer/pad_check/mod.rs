@@ -65,6 +65,8 @@ pub struct PadCheck {
     pub by: Option<Operator>,
     /// Frames of the sweep, before the sensors are observed.
     swept_frames: u64,
+    /// The lowest voltages of both packs since the check began, V: moving servos draw most.
+    lowest_v: [Option<f64>; 2],
     /// Frame until which the surfaces return to rest.
     returns_until: u64,
     /// Findings so far, in order of detection.
@@ -104,6 +106,9 @@ impl PadCheck {
         mission: &Mission,
         arming: &ArmingLimits,
     ) -> Option<SurfaceCommand> {
+        for (lowest_v, volts) in self.lowest_v.iter_mut().zip([input.battery_v, input.servo_battery_v]) {
+            *lowest_v = volts.map(|volts| -larger(-volts, -lowest_v.unwrap_or(volts)));
+        }
         match &mut self.stage {
             Stage::Resting => return None,
             Stage::Sweeping(sweep) => {
@@ -125,7 +130,7 @@ impl PadCheck {
                 self.findings.extend(still.lean_from_the_rail(mission));
             }
         }
-        self.findings.extend(findings_of_switches(input, mission, arming));
+        self.findings.extend(findings_of_switches(input, self.lowest_v, mission, arming));
         let failed = self.findings.iter().any(|found| found.verdict == Verdict::NotOk);
         self.state = if failed { CheckState::Failed } else { CheckState::Passed };
         self.stage = Stage::Resting;
@@ -227,6 +232,7 @@ pub enum Item {
     BatteryVoltage,
     LogRunning,
     LogSpace,
+    ServoBatteryVoltage,
 }
 
 impl Item {
@@ -265,6 +271,7 @@ impl Item {
             Self::BatteryVoltage => (51, "battery"),
             Self::LogRunning => (52, "log"),
             Self::LogSpace => (53, "log space"),
+            Self::ServoBatteryVoltage => (54, "servo battery"),
         };
         (number, text!("{name}"))
     }
@@ -318,9 +325,10 @@ fn judged(ok: bool) -> Verdict {
     if ok { Verdict::Ok } else { Verdict::NotOk }
 }
 
-/// Switches, battery and log.
+/// Switches, batteries and log.
 fn findings_of_switches(
     input: &SensedInput,
+    [battery_v, servo_battery_v]: [Option<f64>; 2],
     mission: &Mission,
     arming: &ArmingLimits,
 ) -> impl Iterator<Item = CheckedValue> {
@@ -331,7 +339,8 @@ fn findings_of_switches(
         on_a_rail.then(|| closed(Item::BoosterWire, input.booster_attached)),
         // In while people work at the vehicle, out before arming: both states are correct.
         Some(only_shown(Item::PinOut, f64::from(u8::from(input.pin_out)))),
-        input.battery_v.map(|volts| at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        battery_v.map(|volts| at_least(Item::BatteryVoltage, volts, arming.battery_min_v)),
+        servo_battery_v.map(|volts| at_least(Item::ServoBatteryVoltage, volts, arming.servo_battery_min_v)),
         Some(closed(Item::LogRunning, input.log.running)),
         Some(at_least(Item::LogSpace, input.log.space_bytes as f64, arming.log_space_min_bytes as f64)),
     ]

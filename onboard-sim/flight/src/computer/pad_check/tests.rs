@@ -171,6 +171,23 @@ fn each_wrong_surface_is_named_with_what_is_wrong() {
     }
 }
 
+/// The lowest voltage counts, not the last one.
+#[test]
+fn a_battery_that_sags_during_the_check_fails_it() {
+    let (mission, mut check) = (mission(), PadCheck::default());
+    check.begin(&mission.airframe, false, None);
+    for (frame, servo_volts) in (0..).zip([12.0, 10.9].into_iter().chain(core::iter::repeat(12.0))) {
+        let switches = SensedInput { servo_battery_v: Some(servo_volts), ..sound() };
+        check.step(&reading([0.0; SURFACES], at_rest(frame, 1.0), &switches), &mission, &mission.arming);
+        if !check.is_running() {
+            break;
+        }
+    }
+    assert_eq!(failing(&check), [Item::ServoBatteryVoltage]);
+    let found = check.findings.iter().find(|found| found.item == Item::ServoBatteryVoltage);
+    assert!(found.is_some_and(|found| (found.value - 10.9).abs() < 1e-12), "{found:?}");
+}
+
 #[test]
 fn each_sensor_and_switch_is_judged() {
     let still = |noise, switches: SensedInput| failing(&checked(NOTHING_WRONG, noise, &switches, false));
@@ -179,6 +196,10 @@ fn each_sensor_and_switch_is_judged() {
     assert_eq!(still(1.0, SensedInput { battery_v: Some(7.3), ..sound() }), [Item::BatteryVoltage]);
     assert_eq!(still(1.0, SensedInput { battery_v: Some(f64::NAN), ..sound() }), [Item::BatteryVoltage]);
     assert_eq!(still(1.0, SensedInput { battery_v: None, ..sound() }), []);
+    for volts in [11.0, f64::NAN] {
+        let servos = SensedInput { servo_battery_v: Some(volts), ..sound() };
+        assert_eq!(still(1.0, servos), [Item::ServoBatteryVoltage]);
+    }
     assert_eq!(
         still(1.0, SensedInput { log: LogState { running: false, ..sound().log }, ..sound() }),
         [Item::LogRunning]

@@ -258,7 +258,7 @@ fn a_check_is_reported_value_by_value() {
     let last = last.unwrap();
     assert_eq!(last.state, TdPadCheckState::TD_PAD_CHECK_STATE_PASSED);
     assert_eq!((usize::from(last.found), last.progress, last.run), (places.len(), 100, 1));
-    assert_eq!(places.len(), 31);
+    assert_eq!(places.len(), 32);
     airborne.run(40.0);
     let late = airborne.run(10.0);
     assert!((9..=11).contains(&count(&late, TD_PAD_CHECK_DATA::ID)), "once a second");

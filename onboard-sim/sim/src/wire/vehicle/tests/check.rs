@@ -216,9 +216,9 @@ fn without_motion_everything_but_the_surfaces_is_checked() {
         state(rocket) != CheckState::Running
     });
     assert_eq!(state(&rocket), CheckState::Passed);
-    // Eight of the sensors, five of switches, battery and log: mk2 starts at apogee, without a
+    // Eight of the sensors, six of switches, batteries and log: mk2 starts at apogee, without a
     // booster's wire.
-    assert_eq!(rocket.computer().pad_check().findings.len(), 13);
+    assert_eq!(rocket.computer().pad_check().findings.len(), 14);
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn an_empty_battery_is_found_reported_and_inhibits_arming() {
     let mut rocket = on_the_pad("none", &[]);
     rocket.vehicle.sortie.set_battery(0.08);
     checked(&mut rocket);
-    assert_eq!(failing(&rocket), [Item::BatteryVoltage]);
+    assert_eq!(failing(&rocket), [Item::BatteryVoltage, Item::ServoBatteryVoltage]);
     let refused = rocket.request(CrewCommand::Arm);
     let reason = refused.reason.unwrap();
     assert!(reason.starts_with("battery: found 7.1") && reason.ends_with("at least 7.4 V"), "{reason}");
