@@ -12,7 +12,7 @@ use crate::pages_run::{in_shell, lines_of_commands, root};
 const PAGE: &str = "docs/launch-day.md";
 const SIZE: (u16, u16) = (120, 40);
 /// The countdown of mk3, and what a busy machine adds.
-const COUNTDOWN: Duration = Duration::from_secs(60);
+const COUNTDOWN: Duration = Duration::from_mins(1);
 
 /// What the lines of the page that end by themselves answer: how they begin, and words.
 const ANSWERS: [(&str, &str); 11] = [

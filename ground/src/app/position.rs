@@ -20,8 +20,6 @@ const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 const EVERY: Duration = Duration::from_millis(900);
 /// A source that works reports once a second, also without a fix.
 const QUIET_FOR: Duration = Duration::from_secs(10);
-/// While there is no connection, nothing is expected.
-const NEVER: Duration = Duration::from_hours(24 * 365);
 /// The longest line, bytes: gpsd's longest report has 10,240.
 const LINE_MAX: usize = 16 * 1024;
 
@@ -86,16 +84,12 @@ impl Locator {
                 Ok(Some(Received::Stream(_, bytes) | Received::Datagram { bytes, .. })) => self.take(&bytes),
                 Ok(Some(Received::Up(_))) => {
                     self.line.clear();
-                    self.quiet_at = Instant::now() + QUIET_FOR;
                     if self.source.is_gpsd {
                         self.transport.sender().send(WATCH.to_vec());
                     }
                     None
                 }
-                Ok(Some(Received::Down(why))) => {
-                    self.quiet_at = Instant::now() + NEVER;
-                    Some(Err(why))
-                }
+                Ok(Some(Received::Down(why))) => Some(Err(why)),
                 Ok(Some(_)) => None,
                 Err(_elapsed) => {
                     self.quiet_at = Instant::now() + QUIET_FOR;
@@ -105,7 +99,8 @@ impl Locator {
                     {
                         self.transport = again;
                     }
-                    Some(Err("no position for 10 s, neither gpsd's TPV nor NMEA's GGA".to_owned()))
+                    let words = "no position for 10 s, neither gpsd's TPV nor NMEA's GGA";
+                    self.trouble.is_none().then(|| Err(words.to_owned()))
                 }
             };
             let now = Instant::now();

@@ -126,8 +126,8 @@ mod tests {
     use crate::attach::{Hello, StationStatus};
     use crate::key::Key;
     use crate::model::{
-        AlarmKind, ChecklistEntry, CommandKind, KeyOwner, LinkReport, LogHealth, LogSpace, Mark, Request,
-        Seat, Settings, Signature, parse_checklist,
+        AlarmKind, ChecklistEntry, CommandKind, Degrees, KeyOwner, LinkReport, LogHealth, LogSpace, Mark,
+        Request, Seat, Settings, Signature, parse_checklist,
     };
 
     fn back(message: &ToScreen, now: Duration) -> (ToScreen, Duration) {
@@ -168,6 +168,7 @@ mod tests {
         let station = Settings {
             key_owner: Some(KeyOwner { number: 2, name: "Bob".to_owned() }),
             mission: Some(MissionHash([1, 2, 3, 4, 5, 6, 7, 8])),
+            here: Some(Degrees { latitude: 1.5, longitude: -2.5 }),
             interactive: false,
             ..Settings::on_screen("a")
         };
@@ -176,6 +177,8 @@ mod tests {
             Msg::Checklist(Box::new(list)),
             Msg::Book { head, is_signed: true },
             Msg::Report(Err("disk full".to_owned())),
+            Msg::Here(Ok(Degrees { latitude: 35.347, longitude: -117.809 })),
+            Msg::Here(Err("no fix".to_owned())),
             Msg::Links {
                 links: vec![link()],
                 signing: Some(SigningCounters { wrong: 3, ..Default::default() }),

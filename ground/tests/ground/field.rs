@@ -3,7 +3,9 @@
 use ground::model::{Degrees, Role, Settings};
 use ground::replay::Player;
 use ground::replay::recording::Recording;
-use protocol::dialect::{GLOBAL_POSITION_INT_DATA, HOME_POSITION_DATA, MavMessage, TD_FLIGHT_STATUS_DATA};
+use protocol::dialect::{
+    GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, HOME_POSITION_DATA, MavMessage, TD_FLIGHT_STATUS_DATA,
+};
 use protocol::field::{Field, Kind};
 use protocol::frame::Encoder;
 use protocol::identity::{Address, VEHICLE};
@@ -91,7 +93,7 @@ fn a_replay_draws_the_field_of_the_log() {
     for (name, run, frames) in [
         ("no field.mcap", vec![], vec![home()]),
         ("not a field.mcap", vec![("field", "pond")], vec![home()]),
-        ("no pad.mcap", vec![("field", "{}")], vec![MavMessage::HEARTBEAT(Default::default())]),
+        ("no pad.mcap", vec![("field", "{}")], vec![MavMessage::HEARTBEAT(HEARTBEAT_DATA::default())]),
     ] {
         assert_eq!(played(name, &run, &frames).settings.field, None, "{name}");
     }

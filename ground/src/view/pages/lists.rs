@@ -6,7 +6,7 @@ use ratatui::text::Line;
 
 use crate::model::{ABORT_WORDS, Act, Alarm, DEFINITIONS, Model, Role};
 use crate::view::status_lines::{alarm_state, cut};
-use crate::view::{TextRole, Theme, lists, seconds};
+use crate::view::{TextRole, Theme, lists};
 
 /// Columns of `ended alarm: ` and shorter words.
 const WORD_COLUMNS: usize = 13;
@@ -71,7 +71,7 @@ fn book(model: &Model) -> String {
 }
 
 /// The state of the recording, its files and counts.
-pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static>> {
+pub fn log_lines(model: &Model, theme: Theme) -> Vec<Line<'static>> {
     let row = |label: &str, value: String, role: TextRole| {
         Line::from(vec![theme.label(format!(" {label:<14}")), theme.span(value, role)])
     };
@@ -79,7 +79,6 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         return vec![
             row("state", "a recorded flight; nothing is written".to_owned(), TextRole::Plain),
             row("log", model.settings.log_path.clone().unwrap_or_default(), TextRole::Plain),
-            row("events", model.events.total().to_string(), TextRole::Plain),
         ];
     }
     let state = match (&model.settings.log_path, model.log.failed, model.log.dropped) {
@@ -94,12 +93,7 @@ pub fn log_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         state,
         row("log", model.settings.log_path.clone().unwrap_or_else(none), TextRole::Plain),
         row("space", space, TextRole::Plain),
-        row("running for", seconds(now), TextRole::Plain),
-        row("events", model.events.total().to_string(), TextRole::Plain),
         row("book", book(model), TextRole::Plain),
-        Line::default(),
-        theme.line(" Both directions of the link and all actions of the crew are recorded.", TextRole::Label),
-        theme.line(" Records older than 0.2 s are on disk, even if this program crashes.", TextRole::Label),
     ]
 }
 

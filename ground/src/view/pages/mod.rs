@@ -89,7 +89,7 @@ pub fn lines(model: &Model, theme: Theme, now: Duration, area: Rect) -> Vec<Line
     match model.page() {
         Page::Link => link::lines(model, theme, now, columns, rows),
         Page::Messages => lists::messages_lines(model, theme, columns, rows),
-        Page::Log => lists::log_lines(model, theme, now),
+        Page::Log => lists::log_lines(model, theme),
         Page::Alarms => lists::alarms(model, theme, now, columns, rows),
         Page::Find => checks::find_lines(model, theme, now),
         Page::Checks => checks::checks_lines(model, theme, now, columns),

@@ -118,18 +118,9 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
     let around = |(x, y): (f64, f64), radius: f64| [(x - radius, y - radius), (x + radius, y + radius)];
     let on_pad = phase.is_some_and(is_on_pad);
-    let finds = model.page() == Page::Find;
-    let of_pad = |at: Degrees| vehicle.pad.map(|pad| pad.to(at)).map(|(north_m, east_m)| (east_m, north_m));
-    let crew = model.here().filter(|_| on_pad || finds).and_then(of_pad);
-    let trackers = model.trackers.iter().filter_map(|(id, tracker)| Some((*id, of_pad(tracker.at.value)?)));
-    // One far away would make everything small, unless the crew looks for it.
-    let near_m = fence_m.unwrap_or(TRACKER_NEAR_M);
-    let is_drawn = |(id, (x, y)): &(u8, (f64, f64))| {
-        libm::hypot(*x, *y) < near_m || (finds && model.pages.tracker == Some(*id))
-    };
-    let trackers: Vec<(u8, (f64, f64))> = trackers.filter(is_drawn).collect();
-    let mut points: Vec<(f64, f64)> = here.into_iter().chain(stands).chain(crew).collect();
-    points.extend(trackers.iter().map(|(_, at)| at));
+    let others = others(model, on_pad);
+    let mut points: Vec<(f64, f64)> =
+        here.into_iter().chain(stands).chain(others.iter().map(|(at, ..)| *at)).collect();
     points.extend(lost.iter().flat_map(|at| around((at.east_m, at.north_m), at.error_m.min(500.0))));
     points.extend(down.iter().map(|at| (at.east_m, at.north_m)).chain(impact));
     if !burns || points.is_empty() {
@@ -205,19 +196,35 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
         plane.beside(frame, at, &[words.to_owned()], theme.style(TextRole::Label));
     };
     label(frame, (0.0, 0.0), "pad");
-    if let Some(at) = crew {
-        plane.write(frame, at, "o", strong);
-        let words =
-            if finds { "here".to_owned() } else { format!("crew {} m", fixed(libm::hypot(at.0, at.1), 0)) };
+    for (at, mark, words) in others {
+        plane.write(frame, at, mark, strong);
         label(frame, at, &words);
-    }
-    for (id, at) in trackers {
-        plane.write(frame, at, "*", strong);
-        label(frame, at, &format!("system {id}"));
     }
     if let Some((at, tilt_deg)) = rail {
         label(frame, at, &format!("rail {} deg", fixed(tilt_deg, 0)));
     }
+}
+
+/// The crew and the other vehicles: positions east and north of the pad, m, with marks and words.
+fn others(model: &Model, on_pad: bool) -> Vec<((f64, f64), &'static str, String)> {
+    let Some(pad) = model.vehicle.pad else { return Vec::new() };
+    let finds = model.page() == Page::Find;
+    let of_pad = |at: Degrees| {
+        let (north_m, east_m) = pad.to(at);
+        ((east_m, north_m), libm::hypot(east_m, north_m))
+    };
+    let crew = model.here().filter(|_| on_pad || finds).map(of_pad);
+    let crew = crew.map(|(at, far_m)| {
+        (at, "o", if on_pad { format!("crew {} m", fixed(far_m, 0)) } else { "here".to_owned() })
+    });
+    // One far away would make everything small, unless the crew looks for it.
+    let near_m = model.vehicle.fence_m().unwrap_or(TRACKER_NEAR_M);
+    let trackers = model.trackers.iter().filter_map(|(id, tracker)| {
+        let (at, far_m) = of_pad(tracker.at.value);
+        let is_drawn = far_m < near_m || (finds && model.pages.tracker == Some(*id));
+        is_drawn.then(|| (at, "*", format!("system {id}")))
+    });
+    crew.into_iter().chain(trackers).collect()
 }
 
 /// Writes how far the field's lines are beside a position, or else beside a spot.
