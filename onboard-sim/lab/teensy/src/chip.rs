@@ -1,7 +1,8 @@
 //! The image of a Teensy 4.1: entry, heap, timer, both contexts.
 //!
-//! Its buses and pins are stand-ins that report nothing: a club puts those of `teensy4-bsp` in
-//! their places. So it shows that everything is linked and fits, and does not fly.
+//! SPI, I2C, switches and outputs are those of `teensy4-bsp` on the pins of `README.md`. UARTs,
+//! servos and the services of the chip are stand-ins that report nothing: `README.md` says what a
+//! club writes in their places. So it shows that everything is linked and fits, and does not fly.
 
 use alloc::boxed::Box;
 use core::cell::Cell;
@@ -12,10 +13,8 @@ use avionics::link::endpoint::UplinkState;
 use cortex_m::peripheral::syst::SystClkSource;
 use critical_section::Mutex;
 use embedded_hal::delay::DelayNs;
-use embedded_hal::digital::{self, InputPin, OutputPin};
-use embedded_hal::i2c::{self, I2c};
 use embedded_hal::pwm::{self, SetDutyCycle};
-use embedded_hal::spi::{self, SpiDevice};
+use embedded_hal_bus::spi::ExclusiveDevice;
 use embedded_io::{Read, ReadReady};
 use embedded_sdmmc::SdCard;
 use flight::computer::LogState;
@@ -28,6 +27,10 @@ use linked_list_allocator::LockedHeap;
 use panic_halt as _;
 use teensy::card::{Appender, CardLog, Ring};
 use teensy::{Build, Chip, Parts, Surface, TeensyBoard, Wiring, start, tick};
+use teensy4_bsp::board::{self, Lpi2cClockSpeed, Lpspi, LpspiPins};
+use teensy4_bsp::hal::gpio::{Input, Output};
+use teensy4_bsp::hal::iomuxc::{Config, PullKeeper, configure};
+use teensy4_bsp::hal::lpi2c::Lpi2c;
 use teensy4_fcb as _;
 
 extern crate alloc;
@@ -43,7 +46,14 @@ static HEAP: LockedHeap = LockedHeap::empty();
 const CLOCK_HZ: u32 = 600_000_000;
 const TICKS: u32 = 500;
 
-type Flight = (avionics::board::port::Frames, TeensyBoard<StandIns>);
+/// Clocks of the inertial unit's bus, and of the card's: a card starts at 400 kHz at most.
+const IMU_HZ: u32 = 8_000_000;
+const CARD_START_HZ: u32 = 400_000;
+const CARD_HZ: u32 = 20_000_000;
+
+/// A bus with one device, whose chip select is an ordinary pin.
+type Spi = ExclusiveDevice<Lpspi, Output, Waits>;
+type Flight = (avionics::board::port::Frames, TeensyBoard<Wired>);
 
 /// The flight, until the timer takes it, and a problem and its solution on their ways.
 static FLIGHT: Mutex<Cell<Option<Box<Flight>>>> = Mutex::new(Cell::new(None));
@@ -79,32 +89,19 @@ fn main() -> ! {
     static mut RING: Ring = Ring::new();
     HEAP.lock().init_from_slice(MEMORY);
     let (producer, mut consumer) = RING.split();
-    let mut log = CardLog::new(SdCard::new(StandIn, StandIn));
-    let Some((_, mission)) = teensy::mission("mk3") else {
+    let wired = wired(StandInChip(Appender::new(producer)));
+    let (Some((_, mission)), Some((parts, card))) = (teensy::mission("mk3"), wired) else {
         loop {
             cortex_m::asm::wfi();
         }
     };
-    let chip = StandInChip(Appender::new(producer));
-    let parts = Parts {
-        imu: StandIn,
-        barometer: StandIn,
-        gnss: StandIn,
-        lidar: StandIn,
-        servos: [const { StandIn }; 6],
-        outputs: [const { StandIn }; 5],
-        foot: StandIn,
-        igniters: [const { StandIn }; 2],
-        booster: StandIn,
-        pin: StandIn,
-        chip,
-    };
+    let mut log = CardLog::new(card);
     let build = Build {
         body_from_imu: [(0, 1.0), (1, 1.0), (2, 1.0)],
         surfaces: [Surface { zero_us: 1500.0, us_per_rad: 600.0 }; 6],
         fix_age_s: 0.12,
     };
-    if let Ok(flight) = start(parts, build, teensy::at_power_up(&mission), &mut StandIn) {
+    if let Ok(flight) = start(parts, build, teensy::at_power_up(&mission), &mut Waits) {
         critical_section::with(|cs| FLIGHT.borrow(cs).set(Some(Box::new(flight))));
     }
     if let Some(peripherals) = cortex_m::Peripherals::take() {
@@ -125,7 +122,56 @@ fn main() -> ! {
     }
 }
 
-/// A bus, pin or clock that reports nothing. The compiler must not know that.
+/// Waits for a time, by the processor's clock.
+struct Waits;
+
+impl DelayNs for Waits {
+    fn delay_ns(&mut self, ns: u32) {
+        cortex_m::asm::delay(ns.div_ceil(1000).saturating_mul(CLOCK_HZ / 1_000_000));
+    }
+}
+
+/// The parts on their pins, and the card; `None` if a pin is not where this expects it.
+fn wired(chip: StandInChip) -> Option<(Parts<Wired>, SdCard<Spi, Waits>)> {
+    let board::Resources { mut pins, mut gpio1, mut gpio2, mut gpio3, mut gpio4, lpspi3, lpspi4, lpi2c1, .. } =
+        board::t41(board::instances());
+    // A switch to ground is high while it is open; an igniter without current is low.
+    let (up, down) = (Some(PullKeeper::Pullup22k), Some(PullKeeper::Pulldown100k));
+    configure(&mut pins.p31, Config::zero().set_pull_keeper(up));
+    configure(&mut pins.p32, Config::zero().set_pull_keeper(up));
+    configure(&mut pins.p33, Config::zero().set_pull_keeper(up));
+    configure(&mut pins.p29, Config::zero().set_pull_keeper(down));
+    configure(&mut pins.p30, Config::zero().set_pull_keeper(down));
+    let outputs = [
+        gpio1.output(pins.p20).ok()?,
+        gpio1.output(pins.p21).ok()?,
+        gpio1.output(pins.p22).ok()?,
+        gpio1.output(pins.p23).ok()?,
+        gpio3.output(pins.p28).ok()?,
+    ];
+    let imu = board::lpspi(lpspi4, LpspiPins { sdo: pins.p11, sdi: pins.p12, sck: pins.p13 }, IMU_HZ);
+    let card = board::lpspi(lpspi3, LpspiPins { sdo: pins.p26, sdi: pins.p1, sck: pins.p27 }, CARD_START_HZ);
+    let card = SdCard::new(ExclusiveDevice::new(card, gpio1.output(pins.p0).ok()?, Waits).ok()?, Waits);
+    // Starts it, if there is one.
+    let _ = card.num_bytes();
+    card.spi(|device| device.bus_mut().disabled(|spi| spi.set_clock_hz(board::LPSPI_FREQUENCY, CARD_HZ)));
+    let parts = Parts {
+        imu: ExclusiveDevice::new(imu, gpio2.output(pins.p10).ok()?, Waits).ok()?,
+        barometer: board::lpi2c(lpi2c1, pins.p19, pins.p18, Lpi2cClockSpeed::KHz400),
+        gnss: StandIn,
+        lidar: StandIn,
+        servos: [const { StandIn }; 6],
+        outputs,
+        foot: gpio3.input(pins.p31).ok()?,
+        igniters: [gpio4.input(pins.p29).ok()?, gpio3.input(pins.p30).ok()?],
+        booster: gpio2.input(pins.p32).ok()?,
+        pin: gpio4.input(pins.p33).ok()?,
+        chip,
+    };
+    Some((parts, card))
+}
+
+/// A bus or clock that reports nothing. The compiler must not know that.
 struct StandIn;
 
 /// A stand-in has no device behind it.
@@ -144,55 +190,15 @@ impl core::fmt::Display for Nothing {
 
 impl core::error::Error for Nothing {}
 
-impl spi::Error for Nothing {
-    fn kind(&self) -> spi::ErrorKind {
-        spi::ErrorKind::Other
-    }
-}
-
-impl i2c::Error for Nothing {
-    fn kind(&self) -> i2c::ErrorKind {
-        i2c::ErrorKind::Other
-    }
-}
-
 impl pwm::Error for Nothing {
     fn kind(&self) -> pwm::ErrorKind {
         pwm::ErrorKind::Other
     }
 }
 
-impl digital::Error for Nothing {
-    fn kind(&self) -> digital::ErrorKind {
-        digital::ErrorKind::Other
-    }
-}
-
 impl embedded_io::Error for Nothing {
     fn kind(&self) -> embedded_io::ErrorKind {
         embedded_io::ErrorKind::Other
-    }
-}
-
-impl spi::ErrorType for StandIn {
-    type Error = Nothing;
-}
-
-impl SpiDevice for StandIn {
-    fn transaction(&mut self, operations: &mut [spi::Operation<'_, u8>]) -> Result<(), Nothing> {
-        black_box(operations);
-        nothing()
-    }
-}
-
-impl i2c::ErrorType for StandIn {
-    type Error = Nothing;
-}
-
-impl I2c for StandIn {
-    fn transaction(&mut self, address: u8, operations: &mut [i2c::Operation<'_>]) -> Result<(), Nothing> {
-        black_box((address, operations));
-        nothing()
     }
 }
 
@@ -237,34 +243,6 @@ impl SetDutyCycle for StandIn {
         black_box(duty);
         nothing()
     }
-}
-
-impl digital::ErrorType for StandIn {
-    type Error = Nothing;
-}
-
-impl OutputPin for StandIn {
-    fn set_low(&mut self) -> Result<(), Nothing> {
-        nothing()
-    }
-
-    fn set_high(&mut self) -> Result<(), Nothing> {
-        nothing()
-    }
-}
-
-impl InputPin for StandIn {
-    fn is_high(&mut self) -> Result<bool, Nothing> {
-        nothing().map(|()| true)
-    }
-
-    fn is_low(&mut self) -> Result<bool, Nothing> {
-        nothing().map(|()| true)
-    }
-}
-
-impl DelayNs for StandIn {
-    fn delay_ns(&mut self, _: u32) {}
 }
 
 /// The chip's services; a memory that outlasts a reset, a clock and a radio are stand-ins, too.
@@ -313,15 +291,15 @@ impl Chip for StandInChip {
     }
 }
 
-struct StandIns;
+struct Wired;
 
-impl Wiring for StandIns {
-    type Imu = StandIn;
-    type Barometer = StandIn;
+impl Wiring for Wired {
+    type Imu = Spi;
+    type Barometer = Lpi2c;
     type Gnss = StandIn;
     type Lidar = StandIn;
     type Servo = StandIn;
-    type Output = StandIn;
-    type Switch = StandIn;
+    type Output = Output;
+    type Switch = Input;
     type Chip = StandInChip;
 }

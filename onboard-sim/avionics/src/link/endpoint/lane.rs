@@ -15,7 +15,7 @@ use protocol::command::CommandAnswer;
 use protocol::dialect::MavMessage;
 use protocol::frame::{Encoder, Frame};
 use protocol::hub::line::{RadioShare, SHARE};
-use protocol::identity::NETWORK_BUDGET_BYTES_S;
+use protocol::identity::{NETWORK_BUDGET_BYTES_S, VEHICLE};
 
 use super::questions::FileService;
 use super::{Context, MAX_REQUESTED, Outgoing};
@@ -55,67 +55,49 @@ impl From<MavMessage> for QueuedAnswer {
     }
 }
 
-/// Links that carry the same frames.
-#[derive(Clone)]
-pub(super) struct Lane {
-    pub(super) links: Vec<usize>,
-    pub(super) streams: Streams,
-    pub(super) encoder: Encoder,
-    sent: Window,
-    /// Telemetry of the last [`BRIEFLY_S`] seconds.
-    telemetry_briefly: Window,
-    /// Answers and texts of the last [`BRIEFLY_S`] seconds.
-    answers_briefly: Window,
-    answered: Window,
-    /// Texts of the last second.
-    texts_briefly: Window,
-    /// Uplink reports (TD_UPLINK) that are not yet sent.
-    uplinks: VecDeque<MavMessage>,
-    /// Answers to aborts, at most one for each station.
-    aborts: VecDeque<CommandAnswer>,
-    abort_answered_s: f64,
-    texts: VecDeque<QueuedAnswer>,
-    answers: VecDeque<QueuedAnswer>,
-    /// Requested messages; they are sent after all vital messages.
-    requested: VecDeque<MavMessage>,
-    /// The next parameter of a requested list; `None` when the list has been sent.
-    pub(super) next_parameter: Option<u16>,
-    /// When the next piece of a file may be sent: they are spread evenly, as the link carries them.
-    piece_due_s: f64,
-    /// The budget that the lane was given, bytes per second; a radio may leave less of it.
-    granted_bytes_s: u32,
-    radio: RadioShare,
-    /// Time at which a line slower than a radio has sent everything given to it. All but vital
-    /// messages wait for that, so that nothing queues behind them.
-    line_free_at_s: f64,
-    /// When the next uplink reports go over such a line.
-    uplinks_at_s: f64,
+flight::with_defaults! {
+    /// Links that carry the same frames.
+    #[derive(Clone)]
+    pub(super) struct Lane {
+        pub(super) links: Vec<usize> = vec![0],
+        pub(super) streams: Streams = Streams::over_a_radio(0, false),
+        pub(super) encoder: Encoder = Encoder::new(VEHICLE),
+        sent: Window = Window::of(WINDOW_S),
+        /// Telemetry of the last [`BRIEFLY_S`] seconds.
+        telemetry_briefly: Window = Window::of(BRIEFLY_S),
+        /// Answers and texts of the last [`BRIEFLY_S`] seconds.
+        answers_briefly: Window = Window::of(BRIEFLY_S),
+        answered: Window = Window::of(WINDOW_S),
+        /// Texts of the last second.
+        texts_briefly: Window = Window::of(WINDOW_S),
+        /// Uplink reports (TD_UPLINK) that are not yet sent.
+        uplinks: VecDeque<MavMessage> = VecDeque::new(),
+        /// Answers to aborts, at most one for each station.
+        aborts: VecDeque<CommandAnswer> = VecDeque::new(),
+        abort_answered_s: f64 = f64::NEG_INFINITY,
+        texts: VecDeque<QueuedAnswer> = VecDeque::new(),
+        answers: VecDeque<QueuedAnswer> = VecDeque::new(),
+        /// Requested messages; they are sent after all vital messages.
+        requested: VecDeque<MavMessage> = VecDeque::new(),
+        /// The next parameter of a requested list; `None` when the list has been sent.
+        pub(super) next_parameter: Option<u16> = None,
+        /// When the next piece of a file may be sent: they are spread evenly, as the link carries
+        /// them.
+        piece_due_s: f64 = 0.0,
+        /// The budget that the lane was given, bytes per second; a radio may leave less of it.
+        granted_bytes_s: u32 = 0,
+        radio: RadioShare = RadioShare::default(),
+        /// Time at which a line slower than a radio has sent everything given to it. All but vital
+        /// messages wait for that, so that nothing queues behind them.
+        line_free_at_s: f64 = 0.0,
+        /// When the next uplink reports go over such a line.
+        uplinks_at_s: f64 = 0.0,
+    }
 }
 
 impl Lane {
     pub(super) fn new(streams: Streams, encoder: Encoder) -> Self {
-        let mut lane = Self {
-            links: vec![0],
-            streams,
-            encoder,
-            sent: Window::of(WINDOW_S),
-            telemetry_briefly: Window::of(BRIEFLY_S),
-            answers_briefly: Window::of(BRIEFLY_S),
-            answered: Window::of(WINDOW_S),
-            texts_briefly: Window::of(WINDOW_S),
-            uplinks: VecDeque::new(),
-            aborts: VecDeque::new(),
-            abort_answered_s: f64::NEG_INFINITY,
-            texts: VecDeque::new(),
-            answers: VecDeque::new(),
-            requested: VecDeque::new(),
-            next_parameter: None,
-            piece_due_s: 0.0,
-            granted_bytes_s: 0,
-            radio: RadioShare::default(),
-            line_free_at_s: 0.0,
-            uplinks_at_s: 0.0,
-        };
+        let mut lane = Self { streams, encoder, ..Self::default() };
         let capacity_bytes_s = lane.streams.capacity_bytes_s();
         lane.set_capacity(capacity_bytes_s, 0.0);
         lane

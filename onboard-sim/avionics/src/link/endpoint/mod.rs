@@ -57,36 +57,38 @@ const ABORTED_BEATS_FOR_S: f64 = 3.0;
 /// In a countdown: the longest interval of flight statuses, s; on a slow line they take half of it.
 const COUNTDOWN_STATUS_S: f64 = 0.2;
 
-/// The vehicle's end of its links.
-pub struct VehicleEndpoint {
-    us: Address,
-    identity: Identity,
-    lanes: Vec<Lane>,
-    /// The budget of each link, bytes per second.
-    capacities_bytes_s: Vec<u32>,
-    text_id: u16,
-    now_s: f64,
-    /// Time at which another vehicle under our ids was last received.
-    twin_received_at_s: Option<f64>,
-    /// The stations, with the uplink quality of each.
-    stations: Stations,
-    /// Whether the vehicle starts by itself, so that no station is required.
-    starts_by_itself: bool,
-    /// Commands that the vehicle decides in its next frame.
-    waiting: Vec<Waiting>,
-    /// The newest first.
-    answered: VecDeque<Answered>,
-    /// Sources that have sent anything; a new one gets the constant data at once.
-    sources: BTreeSet<Address>,
-    refusals: Refusals,
-    warnings: Warnings,
-    last_reported: Option<LastReported>,
-    last_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)>,
-    aborted_at_s: Option<f64>,
-    files: FileService,
-    check_reporter: CheckReporter,
-    finding_reporter: FindingReporter,
-    event_reporter: EventReporter,
+flight::with_defaults! {
+    /// The vehicle's end of its links.
+    pub struct VehicleEndpoint {
+        us: Address = VEHICLE,
+        identity: Identity = Identity { kind: VehicleKind::Real, boot_number: 0, uid: 0 },
+        lanes: Vec<Lane> = vec![Lane::default()],
+        /// The budget of each link, bytes per second.
+        capacities_bytes_s: Vec<u32> = vec![RADIO_BUDGET_BYTES_S],
+        text_id: u16 = 0,
+        now_s: f64 = 0.0,
+        /// Time at which another vehicle under our ids was last received.
+        twin_received_at_s: Option<f64> = None,
+        /// The stations, with the uplink quality of each.
+        stations: Stations = Stations::default(),
+        /// Whether the vehicle starts by itself, so that no station is required.
+        starts_by_itself: bool = false,
+        /// Commands that the vehicle decides in its next frame.
+        waiting: Vec<Waiting> = Vec::new(),
+        /// The newest first.
+        answered: VecDeque<Answered> = VecDeque::new(),
+        /// Sources that have sent anything; a new one gets the constant data at once.
+        sources: BTreeSet<Address> = BTreeSet::new(),
+        refusals: Refusals = Refusals::default(),
+        warnings: Warnings = Warnings::default(),
+        last_reported: Option<LastReported> = None,
+        last_crew: Option<(TwoPerson, Option<Operator>, Option<Station>)> = None,
+        aborted_at_s: Option<f64> = None,
+        files: FileService = FileService::default(),
+        check_reporter: CheckReporter = CheckReporter::default(),
+        finding_reporter: FindingReporter = FindingReporter::default(),
+        event_reporter: EventReporter = EventReporter::default(),
+    }
 }
 
 /// An outgoing frame, and the links that carry it.
@@ -140,29 +142,9 @@ impl VehicleEndpoint {
     }
 
     fn over(kind: VehicleKind, streams: Streams) -> Self {
-        Self {
-            us: VEHICLE,
-            identity: Identity { kind, boot_number: 0, uid: 0 },
-            lanes: vec![Lane::new(streams, Encoder::new(VEHICLE))],
-            capacities_bytes_s: vec![RADIO_BUDGET_BYTES_S],
-            text_id: 0,
-            now_s: 0.0,
-            twin_received_at_s: None,
-            sources: BTreeSet::new(),
-            stations: Stations::default(),
-            starts_by_itself: false,
-            waiting: Vec::new(),
-            answered: VecDeque::new(),
-            refusals: Refusals::default(),
-            warnings: Warnings::default(),
-            last_reported: None,
-            last_crew: None,
-            aborted_at_s: None,
-            files: FileService::default(),
-            check_reporter: CheckReporter::default(),
-            finding_reporter: FindingReporter::default(),
-            event_reporter: EventReporter::default(),
-        }
+        let lanes = vec![Lane::new(streams, Encoder::new(VEHICLE))];
+        let endpoint = Self { lanes, ..Self::default() };
+        Self { identity: Identity { kind, ..endpoint.identity }, ..endpoint }
     }
 
     /// Sets the boot number, which only a new power-up changes.

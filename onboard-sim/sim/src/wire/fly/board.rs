@@ -123,11 +123,8 @@ impl OnBoard {
 
     fn uplink_state(&self) -> Result<UplinkState, RecordError> {
         let Some(stream::RadioInput { uplink, commander, requests }) = &self.radio else {
-            return Ok(UplinkState {
-                uplink: Uplink::NeverReceived,
-                commander: None,
-                requests: Requests::new(),
-            });
+            let (uplink, requests) = (Uplink::NeverReceived, Requests::new());
+            return Ok(UplinkState { uplink, commander: None, requests });
         };
         let at = At { frame: self.last.map_or(0, |last| last + 1), field: "radio" };
         Ok(UplinkState {
