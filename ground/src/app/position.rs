@@ -14,7 +14,7 @@ use crate::cli::PositionSource;
 use crate::model::Degrees;
 use crate::update::Msg;
 
-/// Asks gpsd for its reports (gpsd_json, WATCH).
+/// Requests the reports of gpsd (gpsd_json(5), WATCH).
 const WATCH: &[u8] = b"?WATCH={\"enable\":true,\"json\":true};\n";
 /// The shortest time between two positions: a receiver may send ten a second.
 const EVERY: Duration = Duration::from_millis(900);
@@ -23,7 +23,7 @@ const QUIET_FOR: Duration = Duration::from_secs(10);
 /// The longest line, bytes: gpsd's longest report has 10,240.
 const LINE_MAX: usize = 16 * 1024;
 
-/// A TPV report of gpsd (gpsd_json, TPV); degrees. Other reports have another class.
+/// A TPV report of gpsd (gpsd_json(5), TPV); degrees. Other reports have another class.
 #[derive(Deserialize)]
 struct Report {
     class: String,
@@ -93,7 +93,7 @@ impl Locator {
                 Ok(Some(_)) => None,
                 Err(_elapsed) => {
                     self.quiet_at = Instant::now() + QUIET_FOR;
-                    // The other end may be gone without a word.
+                    // The other end may have left without closing the connection.
                     if matches!(self.source.link, LinkAddress::TcpOut(_))
                         && let Ok(again) = Transport::open(self.source.link.clone()).await
                     {

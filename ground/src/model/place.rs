@@ -91,7 +91,7 @@ impl LastPlace {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Tracker {
     pub(crate) at: Sample<Degrees>,
-    /// Height above where it was switched on, m.
+    /// Height above its home position, m.
     pub(crate) height_m: f64,
 }
 
