@@ -81,18 +81,13 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
             (vehicle.left_pad_at, vehicle.has_lifted) = (None, false);
         }
         Some(_) => {
-            let since = *vehicle.left_pad_at.get_or_insert(now);
-            let climbs = |of: Sample<Motion>| of.received_at >= since && of.value.climb_m_s > MOVES_M_S;
+            vehicle.left_pad_at.get_or_insert(now);
             let is_boosting = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
-            vehicle.has_lifted |= !is_boosting || vehicle.best_motion().is_some_and(climbs);
+            vehicle.has_lifted |= !is_boosting || vehicle.events.of(TdPhase::TD_PHASE_BOOST).is_some();
         }
         None => {}
     }
 }
-
-/// A vehicle on its pad seems to climb more slowly than this, m/s; one that lifts off is faster
-/// within a tenth of a second.
-const MOVES_M_S: f64 = 1.0;
 
 // Values converted on access.
 impl Vehicle {

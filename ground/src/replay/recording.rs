@@ -38,6 +38,8 @@ pub struct Recording {
     events: u64,
     /// The time of the last event.
     pub length: Duration,
+    /// T+0: the release, or if it is not reported the first phase in flight.
+    pub began: Duration,
     /// When each phase began.
     pub phases: Arc<[(TdPhase, Duration)]>,
     /// Why reading ended early, if it did.
@@ -80,8 +82,9 @@ impl Recording {
         };
         let Survey { events: count, length, mut phases, reported, .. } = survey;
         reported.date(&mut phases);
+        let began = reported.flight_began(&phases).unwrap_or_default();
         let (damage, vehicle) = (events.damage(), events.vehicle);
-        Ok(Self { damage, vehicle, file, side, events: count, length, phases: phases.into() })
+        Ok(Self { damage, vehicle, file, side, events: count, length, began, phases: phases.into() })
     }
 
     /// A reader at the first event.

@@ -65,7 +65,7 @@ fn the_report_states_the_verdict_first_and_then_why() {
         let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|<a href=\"geo:35.34|Findings, causes first|\
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
             Place from above, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
-            <td>contact</td>|Inferred at the end: impulse |\
+            <td>touchdown</td>|Inferred at the end: impulse |\
             Path from the south, m|>later plans</span>|>plan at ignition</span>|>nose</span>|>flown</span>|\
             Path from the east, m|Path from above, m|Level speed, m/s|Rotation rate, deg/s|Gimbal pitch, deg|\
             Gimbal yaw, deg|Thrust, N|Where each plan ends, less where it did, m|Wind towards north, m/s|\
@@ -172,7 +172,7 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
     recipe.mission_toml = toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
     recipe.mission = flight::vehicles::mission::from_toml(&recipe.mission_toml, "mk2").unwrap();
     let page = page_of(&fly_recipe(&recipe).log);
-    let moments = ["lift-off", "burn-out", "separation", "apogee", "ignition", "contact"];
+    let moments = ["lift-off", "burnout", "apogee", "ignition", "thrust", "touchdown"];
     let cells = moments.map(|moment| format!("<td>{moment}</td>"));
     has_in_order(&page, &cells.each_ref().map(String::as_str));
     for stage in ["ascent", "fall", "burn"] {
