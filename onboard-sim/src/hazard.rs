@@ -359,11 +359,11 @@ pub fn widest(impacts: &[Impact]) -> Option<(Case, Radius)> {
 pub fn json(wind_m_s: f64, impacts: &[Impact], rule: &Rule) -> Value {
     let of_case = |case: Case| Some((case.name(), Radius::of_case(impacts, case)?));
     let cases: BTreeMap<_, _> = Case::ALL.into_iter().filter_map(of_case).collect();
-    let (widest, landed) = (widest(impacts), landed_as_planned(impacts));
+    let widest = widest(impacts);
     json!({
         "wind_m_s": wind_m_s, "cases": cases, "widest": widest.map(|(case, _)| case.name()),
         "nobody_within_m": widest.map(|(_, radius)| exclusion_m(&radius, rule)),
-        "flights": landed.stands.of, "stand": landed.stands.count, "inside_envelope": landed.envelope.count,
+        "as_planned": landed_as_planned(impacts),
     })
 }
 

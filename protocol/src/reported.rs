@@ -129,7 +129,7 @@ impl ReportedState {
                     *self = Self::default();
                 }
                 self.phase = Some(data.phase);
-                self.status = Some(never_back(self.status.as_ref(), data));
+                self.status = Some(data.clone());
             }
             // An invalid quaternion is ignored.
             MavMessage::ATTITUDE_QUATERNION(data) => self.attitude = Attitude::of(data).or(self.attitude),
@@ -141,11 +141,6 @@ impl ReportedState {
             _ => return false,
         }
         true
-    }
-
-    /// The last status, with a time since the release that never decreases.
-    pub fn status(&self) -> Option<&TD_FLIGHT_STATUS_DATA> {
-        self.status.as_ref()
     }
 
     /// The complete state as one record, without data on the link.
@@ -199,17 +194,6 @@ impl ReportedState {
             ..Telemetry::default()
         }
     }
-}
-
-/// After touchdown the vehicle reports the time of the contact, which it determines a second later.
-fn never_back(
-    before: Option<&TD_FLIGHT_STATUS_DATA>,
-    status: &TD_FLIGHT_STATUS_DATA,
-) -> TD_FLIGHT_STATUS_DATA {
-    let before_ms = before.map_or(0, |status| status.countdown_ms);
-    let goes_on = before_ms < 0 && status.countdown_ms < 0;
-    let countdown_ms = if goes_on { status.countdown_ms.min(before_ms) } else { status.countdown_ms };
-    TD_FLIGHT_STATUS_DATA { countdown_ms, ..status.clone() }
 }
 
 #[cfg(test)]

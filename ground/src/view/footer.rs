@@ -142,7 +142,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     }
     let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
         let after = phases.get(place + 1).map(|(phase, _)| *phase);
-        let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
+        let has_lifted = after.map_or(model.vehicle.has_lifted(), |after| !is_on_pad(after));
         let commanded = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);

@@ -323,7 +323,7 @@ impl Info {
     /// Notes what a flight computer reports that was run again.
     pub(crate) fn note_again(&mut self, recording: &Recording, again: Result<Findings, String>) {
         if let Some(MavMessage::TD_EVENTS(data)) =
-            again.as_ref().ok().and_then(|again| telemetry::events(again.events(), 0))
+            again.as_ref().ok().and_then(|again| telemetry::events(&again.events, 0))
         {
             let mut events = FlightEvents::default();
             events.take(&data);

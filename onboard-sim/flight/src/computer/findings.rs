@@ -161,16 +161,11 @@ pub struct Findings {
     watches: BTreeMap<Sign, SignWatch>,
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
-    /// What happened as intended, too.
-    events: FlightEvents,
+    /// The events of the flight so far.
+    pub events: FlightEvents,
 }
 
 impl Findings {
-    /// The events of the flight so far.
-    pub fn events(&self) -> &FlightEvents {
-        &self.events
-    }
-
     /// Thrust over weight when a foot first touched the ground in the landing burn.
     pub fn thrust_over_weight_at_contact(&self) -> Option<f64> {
         self.thrust_over_weight
