@@ -216,6 +216,28 @@ mod tests {
         reported.record(0.0)
     }
 
+    /// A report is of one boot; what a restarted computer of that boot no longer reports remains.
+    #[test]
+    fn events_are_merged_within_a_boot_and_dropped_with_it() {
+        let report = |boot_number, phase: TdPhase, at_ms| {
+            let mut data = TD_EVENTS_DATA { boot_number, entered: 1 << phase as u16, ..Default::default() };
+            let place = phase as usize - TdPhase::TD_PHASE_BOOST as usize;
+            (data.at_ms[place], data.height_m[place]) = (at_ms, 51.4);
+            data
+        };
+        let mut events = FlightEvents::default();
+        events.take(&report(1, TdPhase::TD_PHASE_IGNITION, 14_705));
+        events.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 7_240));
+        let found: Vec<_> = events.received.iter().map(|event| (event.name, event.at_s)).collect();
+        // The bits of the vehicle's clock: frames of 5 ms.
+        assert_eq!(
+            found,
+            [("apogee", f64::from(1_448 * 5) * 1e-3), ("ignition", f64::from(2_941 * 5) * 1e-3)]
+        );
+        events.take(&report(2, TdPhase::TD_PHASE_CHUTE, 9_000));
+        assert_eq!(events.received.iter().map(|event| event.name).collect::<Vec<_>>(), ["parachute"]);
+    }
+
     /// A roll does not change where the nose points, and both signs of a quaternion are one
     /// attitude.
     #[test]

@@ -146,6 +146,30 @@ fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     assert_eq!((names(&card).len(), fs::read_to_string(card.join("card.txt")).unwrap()), (3, text));
 }
 
+/// The front of this card is the one in the gallery of docs/README.md; `UPDATE_PICTURES` makes it
+/// so.
+#[test]
+fn regress_the_picture_of_a_card() {
+    let directory = tempfile::tempdir().unwrap();
+    let written = run(directory.path(), &["card", "--mission", "vlr", "--wind", "3", "--wind-from", "225"]);
+    assert_eq!(written.status.code(), Some(0), "{}", stderr(&written));
+    let html = fs::read_to_string(directory.path().join("card").join("card.html")).unwrap();
+    let between = |from: &str, to: &str| html.split_once(from).unwrap().1.split_once(to).unwrap().0;
+    let picture = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 740 1060\"><foreignObject width=\"740\" height=\"1060\">\
+         <body xmlns=\"http://www.w3.org/1999/xhtml\"><style>{} body{{background:#fff;padding:10px}}</style>\n\
+         <section>{}</section></body></foreignObject></svg>\n",
+        between("<style>", "</style>"),
+        between("<section>", "</section>"),
+    );
+    roxmltree::Document::parse(&picture).unwrap();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/card.svg");
+    if std::env::var_os("UPDATE_PICTURES").is_some() {
+        fs::write(path, &picture).unwrap();
+    }
+    assert!(fs::read_to_string(path).unwrap_or_default() == picture, "docs/card.svg is stale");
+}
+
 /// `--quiet` leaves the requested result and its path.
 #[test]
 fn a_new_mission_is_quiet_on_request() {
