@@ -17,6 +17,7 @@ use flight::vehicle::fins::{PITCH, YAW};
 use flight::vehicle::mission::{Mission, SensorPlaces};
 use flight::vehicle::thrust_curve::ThrustCurve;
 use flight::vehicles::motors;
+use serde::Serialize;
 use serde_json::{Value, json};
 use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
@@ -29,7 +30,8 @@ use crate::summary::failures;
 
 flight::numbered_enum! {
 /// An answer, from the best to the worst.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     Ok = "ok",
     Tight = "tight",
@@ -110,7 +112,7 @@ const MOST_SHARE: f64 = 0.4;
 const PROPOSED: usize = 2;
 
 /// One question with its answer.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
     pub what: &'static str,
     /// Value of the data.
@@ -144,12 +146,7 @@ pub struct Page {
 impl Page {
     /// The page as JSON.
     pub fn json(&self) -> Value {
-        let row = |row: &Row| {
-            let Row { what, found, beside, verdict, change } = row;
-            json!({ "what": what, "found": found, "beside": beside, "verdict": verdict.name(), "change": change })
-        };
-        let rows: Vec<Value> = self.rows.iter().map(row).collect();
-        json!({ "title": self.title, "verdict": self.verdict().name(), "rows": rows })
+        json!({ "title": self.title, "verdict": self.verdict(), "rows": self.rows })
     }
 
     /// The worst answer.

@@ -6,6 +6,7 @@
 //! uncommanded is a separate flight with the same draws.
 
 use core::fmt;
+use std::collections::BTreeMap;
 
 use flight::computer::AbortEffect;
 use flight::rules::outputs::PyroOutput;
@@ -17,6 +18,7 @@ use flight::vehicle::mission::{Mission, StartPoint};
 use flight::vehicle::site::Site;
 use flight::vehicle::thrust_curve::ThrustCurve;
 use nalgebra::Vector3;
+use serde::Serialize;
 use serde_json::{Value, json};
 use sim::draw::{Chance, draw};
 use sim::fault::TimedFault;
@@ -221,7 +223,7 @@ impl Impact {
 }
 
 /// A radius about the pad, m.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Radius {
     pub flights: usize,
     /// The least radius that holds 99 % of these flights.
@@ -355,18 +357,13 @@ pub fn widest(impacts: &[Impact]) -> Option<(Case, Radius)> {
 
 /// Where flights in one wind come down, as JSON: by case, and the distance of people, m.
 pub fn json(wind_m_s: f64, impacts: &[Impact], rule: &Rule) -> Value {
-    let of_case = |case: Case| {
-        let Radius { flights, holds_m, low_m, high_m, farthest_m } = Radius::of_case(impacts, case)?;
-        Some(
-            json!({ "case": case.name(), "flights": flights, "holds_99_percent_m": holds_m, "low_m": low_m, "high_m": high_m, "farthest_m": farthest_m }),
-        )
-    };
-    let cases: Vec<Value> = Case::ALL.into_iter().filter_map(of_case).collect();
-    let (widest, landed) = (widest(impacts), landed_as_planned(impacts));
+    let of_case = |case: Case| Some((case.name(), Radius::of_case(impacts, case)?));
+    let cases: BTreeMap<_, _> = Case::ALL.into_iter().filter_map(of_case).collect();
+    let widest = widest(impacts);
     json!({
         "wind_m_s": wind_m_s, "cases": cases, "widest": widest.map(|(case, _)| case.name()),
         "nobody_within_m": widest.map(|(_, radius)| exclusion_m(&radius, rule)),
-        "flights": landed.stands.of, "stand": landed.stands.count, "inside_envelope": landed.envelope.count,
+        "as_planned": landed_as_planned(impacts),
     })
 }
 

@@ -129,7 +129,7 @@ impl ReportedState {
                     *self = Self::default();
                 }
                 self.phase = Some(data.phase);
-                self.status = Some(never_back(self.status.as_ref(), data));
+                self.status = Some(data.clone());
             }
             // An invalid quaternion is ignored.
             MavMessage::ATTITUDE_QUATERNION(data) => self.attitude = Attitude::of(data).or(self.attitude),
@@ -141,11 +141,6 @@ impl ReportedState {
             _ => return false,
         }
         true
-    }
-
-    /// The last status, with a time since the release that never decreases.
-    pub fn status(&self) -> Option<&TD_FLIGHT_STATUS_DATA> {
-        self.status.as_ref()
     }
 
     /// The complete state as one record, without data on the link.
@@ -201,17 +196,6 @@ impl ReportedState {
     }
 }
 
-/// After touchdown the vehicle reports the time of the contact, which it determines a second later.
-fn never_back(
-    before: Option<&TD_FLIGHT_STATUS_DATA>,
-    status: &TD_FLIGHT_STATUS_DATA,
-) -> TD_FLIGHT_STATUS_DATA {
-    let before_ms = before.map_or(0, |status| status.countdown_ms);
-    let goes_on = before_ms < 0 && status.countdown_ms < 0;
-    let countdown_ms = if goes_on { status.countdown_ms.min(before_ms) } else { status.countdown_ms };
-    TD_FLIGHT_STATUS_DATA { countdown_ms, ..status.clone() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -230,6 +214,28 @@ mod tests {
         let position = LOCAL_POSITION_NED_DATA { vz: 20.0, ..Default::default() };
         reported.update(&MavMessage::LOCAL_POSITION_NED(position));
         reported.record(0.0)
+    }
+
+    /// A report is of one boot; what a restarted computer of that boot no longer reports remains.
+    #[test]
+    fn events_are_merged_within_a_boot_and_dropped_with_it() {
+        let report = |boot_number, phase: TdPhase, at_ms| {
+            let mut data = TD_EVENTS_DATA { boot_number, entered: 1 << phase as u16, ..Default::default() };
+            let place = phase as usize - TdPhase::TD_PHASE_BOOST as usize;
+            (data.at_ms[place], data.height_m[place]) = (at_ms, 51.4);
+            data
+        };
+        let mut events = FlightEvents::default();
+        events.take(&report(1, TdPhase::TD_PHASE_IGNITION, 14_705));
+        events.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 7_240));
+        let found: Vec<_> = events.received.iter().map(|event| (event.name, event.at_s)).collect();
+        // The bits of the vehicle's clock: frames of 5 ms.
+        assert_eq!(
+            found,
+            [("apogee", f64::from(1_448 * 5) * 1e-3), ("ignition", f64::from(2_941 * 5) * 1e-3)]
+        );
+        events.take(&report(2, TdPhase::TD_PHASE_CHUTE, 9_000));
+        assert_eq!(events.received.iter().map(|event| event.name).collect::<Vec<_>>(), ["parachute"]);
     }
 
     /// A roll does not change where the nose points, and both signs of a quaternion are one

@@ -47,6 +47,12 @@ impl ReportedEvents {
         Some((event.at_s, event.height_m))
     }
 
+    /// T+0: the release, or if it is not reported the first phase in flight.
+    pub(crate) fn flight_began(&self, timeline: &[(TdPhase, Duration)]) -> Option<Duration> {
+        let first = timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
+        first.map(|first| self.released_at.unwrap_or(first))
+    }
+
     /// Dates the phases as the vehicle reports them, not as its messages arrive.
     pub(crate) fn date(&self, timeline: &mut Vec<(TdPhase, Duration)>) {
         for event in &self.reported.received {
@@ -135,10 +141,9 @@ pub(crate) fn note_trace(model: &mut Model, now: Duration) {
     model.history.trace.push(now, row);
 }
 
-/// When the flight began: T+0, or if no release is reported, its first phase.
+/// T+0 of the flight.
 pub fn flight_began(model: &Model) -> Option<Duration> {
-    let first = model.history.timeline.iter().find(|(phase, _)| !is_on_pad(*phase)).map(|(_, at)| *at);
-    first.map(|first| model.vehicle.events.released_at.unwrap_or(first))
+    model.vehicle.events.flight_began(&model.history.timeline)
 }
 
 #[cfg(test)]

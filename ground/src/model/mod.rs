@@ -164,6 +164,8 @@ pub struct Playback {
     /// Recorded time per real time.
     pub speed: f64,
     pub paused: bool,
+    /// T+0 of the recording.
+    pub began: Duration,
     /// Each phase of the recording and when it began.
     pub phases: Arc<[(TdPhase, Duration)]>,
 }

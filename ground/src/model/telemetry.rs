@@ -6,7 +6,7 @@ use mavlink::MessageData;
 use protocol::dialect::{
     BATTERY_STATUS_DATA, HEARTBEAT_DATA, MavMessage, MavModeFlag, MavState, MavSysStatusSensor,
     STORAGE_INFORMATION_DATA, SYS_STATUS_DATA, TD_FINS_DATA, TD_GIMBAL_DATA, TD_LANDING_VERDICT_DATA,
-    TD_MISSION_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdPhase, TdStart,
+    TD_MISSION_DATA, TD_PREDICTED_PATH_DATA, TdLimit, TdStart,
 };
 use protocol::mission::MissionHash;
 use protocol::motion::Degrees;
@@ -29,8 +29,8 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     vehicle.store(message, now);
     match message {
         MavMessage::HEARTBEAT(data) => vehicle.heartbeat = Some(Sample::new(heartbeat(data), now)),
-        MavMessage::TD_FLIGHT_STATUS(_) => {
-            vehicle.status = vehicle.reported.status().map(|status| Sample::new(status.clone(), now));
+        MavMessage::TD_FLIGHT_STATUS(status) => {
+            vehicle.status = Some(Sample::new(status.clone(), now));
             vehicle.note_checks();
         }
         MavMessage::ATTITUDE_QUATERNION(data) => {
@@ -78,22 +78,11 @@ pub fn apply(vehicle: &mut Vehicle, message: &MavMessage, now: Duration) {
     }
     // The flight may have passed in silence: a later phase shows that it took place.
     match vehicle.phase().map(|phase| is_on_pad(phase.value)) {
-        Some(true) if vehicle.verdict().is_none() => {
-            (vehicle.left_pad_at, vehicle.has_lifted) = (None, false);
-        }
-        Some(_) => {
-            let since = *vehicle.left_pad_at.get_or_insert(now);
-            let climbs = |of: Sample<Motion>| of.received_at >= since && of.value.climb_m_s > MOVES_M_S;
-            let is_boosting = vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
-            vehicle.has_lifted |= !is_boosting || vehicle.best_motion().is_some_and(climbs);
-        }
+        Some(true) if vehicle.verdict().is_none() => vehicle.left_pad_at = None,
+        Some(_) => drop(vehicle.left_pad_at.get_or_insert(now)),
         None => {}
     }
 }
-
-/// A vehicle on its pad seems to climb more slowly than this, m/s; one that lifts off is faster
-/// within a tenth of a second.
-const MOVES_M_S: f64 = 1.0;
 
 // Values converted on access.
 impl Vehicle {
@@ -253,20 +242,6 @@ mod tests {
 
     fn close(found: f64, expected: f64) {
         assert!((found - expected).abs() < 1e-5, "{found} is not {expected}");
-    }
-
-    #[test]
-    fn the_time_since_the_release_never_goes_back() {
-        let mut vehicle = Vehicle::default();
-        let mut receive = |countdown_ms| {
-            let status = TD_FLIGHT_STATUS_DATA { boot_number: 7, countdown_ms, ..Default::default() };
-            apply(&mut vehicle, &MavMessage::TD_FLIGHT_STATUS(status), NOW);
-            vehicle.status.as_ref().map(|status| status.value.countdown_ms)
-        };
-        assert_eq!(receive(2_000), Some(2_000));
-        assert_eq!(receive(-22_100), Some(-22_100));
-        assert_eq!(receive(-21_200), Some(-22_100), "the contact is reported a second later");
-        assert_eq!(receive(10_000), Some(10_000), "a new countdown");
     }
 
     #[test]

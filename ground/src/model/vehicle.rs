@@ -144,8 +144,6 @@ pub struct Vehicle {
     /// Its flight computer was reset in this flight.
     pub reset_in_flight: bool,
     pub left_pad_at: Option<Duration>,
-    /// It has moved since then: a motor may fail to ignite on command.
-    pub has_lifted: bool,
     /// The present boot of the vehicle.
     pub boot: Boot,
     /// The warning before a power cycle, and its time: a waiting time runs on through a boot.
@@ -260,6 +258,12 @@ impl Vehicle {
             | TdInterlock::TD_INTERLOCK_NO_LIGHT;
         let chute = self.phase_now() == Some(TdPhase::TD_PHASE_CHUTE);
         !chute && self.interlocks().is_some_and(|locks| !locks.intersects(never))
+    }
+
+    /// Whether it has lifted off: a motor may fail to ignite on command.
+    pub fn has_lifted(&self) -> bool {
+        let is_boosting = self.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+        self.left_pad_at.is_some() && (!is_boosting || self.events.of(TdPhase::TD_PHASE_BOOST).is_some())
     }
 
     /// Whether it has left the pad and is not yet at rest.

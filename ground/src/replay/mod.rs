@@ -43,10 +43,10 @@ impl Player {
     pub fn new(recording: Recording, settings: Settings) -> Self {
         let vehicle = recording.vehicle.unwrap_or(settings.vehicle);
         let settings = Settings { vehicle, field: recording.field.clone(), ..settings };
-        let (length, phases) = (recording.length, Arc::clone(&recording.phases));
+        let (length, began, phases) = (recording.length, recording.began, Arc::clone(&recording.phases));
         let mut player = Self {
             model: Model::new(settings.clone()),
-            playing: Playback { position: Duration::ZERO, length, speed: 1.0, paused: false, phases },
+            playing: Playback { position: Duration::ZERO, length, speed: 1.0, paused: false, began, phases },
             recording,
             settings,
             next_tick: Duration::ZERO,

@@ -43,6 +43,8 @@ pub struct Recording {
     events: u64,
     /// The time of the last event.
     pub length: Duration,
+    /// T+0: the release, or if it is not reported the first phase in flight.
+    pub began: Duration,
     /// When each phase began.
     pub phases: Arc<[(TdPhase, Duration)]>,
     /// Why reading ended early, if it did.
@@ -92,9 +94,10 @@ impl Recording {
         };
         let Survey { events: count, length, mut phases, reported, pad, .. } = survey;
         reported.date(&mut phases);
+        let began = reported.flight_began(&phases).unwrap_or_default();
         let (damage, vehicle) = (events.damage(), events.vehicle);
         let field = events.field.zip(pad).and_then(|(text, pad)| Field::parse(&text, pad, RUN_FACT).ok());
-        Ok(Self { damage, vehicle, field, file, side, events: count, length, phases: phases.into() })
+        Ok(Self { damage, vehicle, field, file, side, events: count, length, began, phases: phases.into() })
     }
 
     /// A reader at the first event.

@@ -336,7 +336,7 @@ const ONCE: bool = false;
 /// The callouts but for phases and heights.
 const CALLOUTS: [(bool, Present); 5] = [
     (ONCE, |model, _| {
-        let lifts = model.vehicle.has_lifted && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
+        let lifts = model.vehicle.has_lifted() && model.vehicle.phase_now() == Some(TdPhase::TD_PHASE_BOOST);
         lifts.then(|| (Amount::Few, "liftoff".to_owned(), WATCH))
     }),
     // On the pad, once the vehicle has reported its checks.

@@ -142,7 +142,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     }
     let been = phases.iter().enumerate().filter_map(|(place, (phase, at))| {
         let after = phases.get(place + 1).map(|(phase, _)| *phase);
-        let has_lifted = after.map_or(model.vehicle.has_lifted, |after| !is_on_pad(after));
+        let has_lifted = after.map_or(model.vehicle.has_lifted(), |after| !is_on_pad(after));
         let commanded = *phase == TdPhase::TD_PHASE_BOOST && !has_lifted;
         // Apogee and fall are one event, and so are ignition and burn.
         let before = place.checked_sub(1).map(|before| phases[before].0);
@@ -161,7 +161,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     let reset = model.rebooted.filter(|_| model.vehicle.reset_in_flight);
     let reset = reset.map(|(_, at)| ("RESET", at, at, EVENT, Ink::Body));
     let marks: Vec<_> = been.chain(reset).chain(to_come).filter(|(_, at, ..)| *at >= from).collect();
-    let lift_off = phases.iter().find(|(phase, _)| !is_on_pad(*phase)).map_or(from, |(_, at)| *at);
+    let began = model.playing.as_ref().map_or(from, |playing| playing.began);
     for (_, at, _, mark, ink) in &marks {
         rows[0][column(*at)] = (*mark, *ink);
     }
@@ -169,7 +169,7 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
     // out.
     for (name, at, exactly, _, ink) in &marks {
         let begin = column(*at);
-        let time_s = seconds_since(*exactly, lift_off);
+        let time_s = seconds_since(*exactly, began);
         let name = if is_wide { format!("{name} {time_s:.1}") } else { (*name).to_owned() };
         let length = name.len();
         // Before its mark only where no other mark is.

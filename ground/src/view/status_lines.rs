@@ -44,7 +44,7 @@ fn apogee_in(vehicle: &Vehicle, now: Duration) -> String {
 fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, String, String)> {
     let words = |event: &str, rest: &str| Some((event.to_owned(), String::new(), rest.to_owned()));
     match phase {
-        TdPhase::TD_PHASE_BOOST if !vehicle.has_lifted => words("lift-off", ", ignition commanded"),
+        TdPhase::TD_PHASE_BOOST if !vehicle.has_lifted() => words("lift-off", ", ignition commanded"),
         // The time stands in the row of the abort, on every page.
         TdPhase::TD_PHASE_COAST if is_inhibited(vehicle) => {
             words("parachute", &format!("{}, at apogee", apogee_in(vehicle, now)))

@@ -286,7 +286,7 @@ pub fn phase(model: &Model, theme: Theme, now: Duration) -> Span<'static> {
 pub fn doing(model: &Model, phase: TdPhase) -> String {
     match phase {
         _ if is_on_pad(phase) && model.vehicle.counts_down() => "COUNTDOWN".to_owned(),
-        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted => "IGN COMMANDED".to_owned(),
+        TdPhase::TD_PHASE_BOOST if !model.vehicle.has_lifted() => "IGN COMMANDED".to_owned(),
         _ => words::phase(phase),
     }
 }

@@ -105,14 +105,11 @@ impl Card {
             wind["nobody_within_m"] = json!(judged.circle.map(|circle| circle.exclusion_m));
             wind
         });
-        let masses = self.masses.iter().map(
-            |(kg, landed)| json!({ "kg": kg, "flights": landed.stands.of, "stand": landed.stands.count }),
-        );
+        let (winds, recipe) = (winds.collect::<Vec<_>>(), &self.recipe);
         json!({
-            "mission": self.recipe.mission.name, "hash": self.hash(), "start": self.start.name(),
-            "dispersion": self.recipe.dispersion_name, "seed": self.recipe.seed,
-            "limit_m_s": limit_m_s(&judged), "rule_m": self.rule.distance_m(),
-            "winds": winds.collect::<Vec<_>>(), "masses": masses.collect::<Vec<_>>(),
+            "mission": recipe.mission.name, "hash": self.hash(), "start": self.start.name(), "winds": winds,
+            "dispersion": recipe.dispersion_name, "seed": recipe.seed, "limit_m_s": limit_m_s(&judged),
+            "rule_m": self.rule.distance_m(), "masses_kg": self.masses,
         })
     }
 

@@ -9,7 +9,7 @@ use onboard_sim::files::{new_folder, write_folder};
 use onboard_sim::hazard::Flights;
 use protocol::program::{Exit, in_range};
 
-use super::{MeanWinds, Selection, on_threads, show_flights};
+use super::{MeanWinds, Selection, answer, on_threads, show_flights};
 
 /// Most flights of a card.
 const CARD_FLIGHTS_MAX: u64 = 10_000;
@@ -48,16 +48,12 @@ pub(crate) fn run(arguments: &CardArguments) -> anyhow::Result<Exit> {
     let card = on_threads(arguments.selection.jobs, || {
         Ok(Card::new(&recipe, winds, flights, arguments.wind_from, &show_flights())?)
     })?;
-    let (page, json) = (card.text(), card.json());
+    let (page, json) = (card.text(), arguments.json.then(|| card.json()));
     let (out, _held) = new_folder(&arguments.out)?;
     let [html, mission] = [card.html(), card.recipe.mission_toml];
     write_folder(&out, &[("card.html", &html), ("card.txt", &page), ("mission.toml", &mission)])?;
-    let mut stdout = std::io::stdout().lock();
-    if arguments.json {
-        writeln!(stdout, "{json:#}")?;
-    } else {
-        writeln!(stdout, "{page}card {}", out.join("card.html").display())?;
-    }
+    let page = format!("{page}card {}\n", out.join("card.html").display());
+    write!(std::io::stdout().lock(), "{}", answer(json, &page))?;
     Ok(Exit::Yes)
 }
 

@@ -12,7 +12,7 @@ use onboard_sim::drawing::{self, Drawing, MK3};
 use protocol::program::{Exit, in_range};
 use serde::Deserialize;
 
-use super::{WindsFile, notify, on_threads, read, recipe, show_flights};
+use super::{WindsFile, answer, notify, on_threads, read, recipe, show_flights};
 
 #[derive(Args)]
 pub(crate) struct CheckArguments {
@@ -57,11 +57,7 @@ pub(crate) fn run(arguments: &CheckArguments) -> anyhow::Result<Exit> {
     let (flights, show) = (arguments.flights, show_flights());
     let progress = |done| show(done, flights as usize);
     let page = on_threads(arguments.jobs, || Ok(check(&recipe, &motors, flights, &progress)?))?;
-    if arguments.json {
-        writeln!(std::io::stdout().lock(), "{:#}", page.json())?;
-    } else {
-        write!(std::io::stdout().lock(), "{page}")?;
-    }
+    write!(std::io::stdout().lock(), "{}", answer(arguments.json.then(|| page.json()), &page))?;
     let fits = arguments.svg.as_deref().map_or(Ok(true), |file| draw(arguments, &recipe.mission, file))?;
     Ok(Exit::of(fits && page.verdict() != Verdict::No))
 }

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use sim::dispersion::is_more_benign;
 use sim::recipe::Recipe;
 
-use super::{MeanWinds, Selection, on_threads, show_flights};
+use super::{MeanWinds, Selection, answer, on_threads, show_flights};
 
 #[derive(Args)]
 pub(crate) struct HazardArguments {
@@ -57,11 +57,12 @@ pub(crate) fn run(arguments: &HazardArguments) -> anyhow::Result<Exit> {
     let rule = Rule::of(mission);
     let wind = dispersion.wind_over_height();
     let study = Study { arguments, mission, cases: &cases, winds_m_s: &winds_m_s, wind, impacts: &impacts };
-    let mut answer = Vec::new();
-    if arguments.json { study.write_json(&rule, &mut answer) } else { study.write_text(&rule, &mut answer) }?;
+    let mut text = Vec::new();
+    study.write_text(&rule, &mut text)?;
+    let answer = answer(arguments.json.then(|| study.json(&rule)), &String::from_utf8_lossy(&text));
     match &arguments.out {
-        Some(path) => drop(NewFile::create(path)?.fill(|file| file.write_all(&answer))?),
-        None => std::io::stdout().lock().write_all(&answer)?,
+        Some(path) => drop(NewFile::create(path)?.fill(|file| file.write_all(answer.as_bytes()))?),
+        None => std::io::stdout().lock().write_all(answer.as_bytes())?,
     }
     if let Some(path) = &arguments.csv {
         let csv = study.csv()?;
@@ -92,16 +93,16 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    fn write_json(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {
+    fn json(&self, rule: &Rule) -> Value {
         let HazardArguments { selection: Selection { dispersion, seed, .. }, .. } = self.arguments;
-        let in_wind = |(wind_m_s, impacts): (&f64, &Vec<Impact>)| hazard::json(*wind_m_s, impacts, rule);
-        let winds: Vec<Value> = self.winds_m_s.iter().zip(self.impacts).map(in_wind).collect();
         let Mission { name, start, gate, .. } = self.mission;
-        let answer = json!({
+        let winds = self.winds_m_s.iter().zip(self.impacts);
+        let winds: Vec<Value> =
+            winds.map(|(wind_m_s, impacts)| hazard::json(*wind_m_s, impacts, rule)).collect();
+        json!({
             "mission": name, "start": start.at.name(), "dispersion": dispersion, "seed": seed, "winds": winds,
             "rule_m": rule.distance_m(), "fence_m": gate.fence_radius_m,
-        });
-        writeln!(out, "{answer:#}")
+        })
     }
 
     fn write_text(&self, rule: &Rule, out: &mut impl std::io::Write) -> std::io::Result<()> {

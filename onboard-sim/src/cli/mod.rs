@@ -23,6 +23,7 @@ use onboard_sim::run::threads;
 use protocol::log::recorder::Recorder;
 use protocol::log::writer::LogHeader;
 use protocol::program::{in_range, is_quiet};
+use serde_json::Value;
 use sim::dispersion::{self, Dispersion};
 use sim::recipe::Recipe;
 use sim::wire::field::with_field;
@@ -162,6 +163,11 @@ fn with_set_value(recipe: &Recipe, key: &str, value: Array, words: &str) -> anyh
     let dispersion_name = format!("{} with {words}", recipe.dispersion_name);
     let dispersion = Dispersion::from_toml(&dispersion_toml, &dispersion_name)?;
     Ok(Recipe { dispersion, dispersion_name, dispersion_toml, ..recipe.clone() })
+}
+
+/// The answer of a command: as JSON, or as text.
+fn answer(json: Option<Value>, text: &impl ToString) -> String {
+    json.map_or_else(|| text.to_string(), |json| format!("{json:#}\n"))
 }
 
 /// Shows how many flights are flown, of how many.

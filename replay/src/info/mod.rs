@@ -13,7 +13,6 @@ use self::counts::{ChannelCounter, EndingTracker, FrameCounter, PhaseTracker};
 use anyhow::{Result, ensure};
 use avionics::link::telemetry;
 use flight::computer::findings::Findings;
-use flight::rules::phase::Phase;
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::from_toml;
 use mavlink::MessageData as _;
@@ -323,7 +322,7 @@ impl Info {
     /// Notes what a flight computer reports that was run again.
     pub(crate) fn note_again(&mut self, recording: &Recording, again: Result<Findings, String>) {
         if let Some(MavMessage::TD_EVENTS(data)) =
-            again.as_ref().ok().and_then(|again| telemetry::events(again.events(), 0))
+            again.as_ref().ok().and_then(|again| telemetry::events(&again.events, 0))
         {
             let mut events = FlightEvents::default();
             events.take(&data);
@@ -482,7 +481,11 @@ impl Answer for Info {
     fn sentences(&self) -> Vec<String> {
         let size = self.size_bytes.map(|bytes| format!(", {}", size_text(bytes))).unwrap_or_default();
         let mut rows = self.ending();
-        rows.extend(self.phases.first().map(|timeline| ("phases", self.phases(timeline))));
+        // The events have the times of a flight without a reset.
+        let shows = |timeline: &&PhaseTimeline| {
+            self.events.is_empty() || timeline.spans.iter().any(|span| span.phase == RESET)
+        };
+        rows.extend(self.phases.first().filter(shows).map(|timeline| ("phases", phases(timeline))));
         rows.extend(self.clocks.flight_zero_s.map(|_| ("events", self.events())));
         rows.push(("grade", format!("{}: {}", self.grade.level.name(), self.grade.reason)));
         rows.push(("complete", self.completeness()));
@@ -555,24 +558,6 @@ impl Info {
         rows
     }
 
-    /// When each phase began; of one with an event its name, because the event has its time.
-    fn phases(&self, timeline: &PhaseTimeline) -> String {
-        let clock = match timeline.source {
-            PhaseSource::Vehicle => "T+ in s, from the vehicle's frames",
-            PhaseSource::Telemetry => "the station's clock in s, from the ground station's telemetry",
-        };
-        let spans = &timeline.spans;
-        let name = |event: &FlightEvent| Phase::from_index(event.phase as u8).map(Phase::name);
-        let is_event = |phase: &str| self.events.iter().any(|event| name(event) == Some(phase));
-        let began = spans.iter().take(PHASES_SHOWN).map(|PhaseSpan { phase, from_s, .. }| {
-            if is_event(phase) { phase.clone() } else { format!("{phase} {from_s:.2}") }
-        });
-        let began = began.collect::<Vec<_>>().join(", ");
-        let more = spans.len().saturating_sub(PHASES_SHOWN) as u64 + timeline.further_changes;
-        let more = if more > 0 { format!(" and {}", counted(more, "more change")) } else { String::new() };
-        format!("{began}{more} ({clock})")
-    }
-
     fn events(&self) -> String {
         let words = |FlightEvent { name, at_s, height_m, .. }: &FlightEvent| {
             // Without the sign of a zero.
@@ -581,7 +566,7 @@ impl Info {
         let words: Vec<String> = self.events.iter().map(words).collect();
         match &words[..] {
             [] => "not reported by the vehicle".to_owned(),
-            words => format!("{} (T+ in s and height, as the vehicle reports them)", words.join(", ")),
+            words => format!("{} (T+ s, height)", words.join(", ")),
         }
     }
 
@@ -680,6 +665,20 @@ impl Frames {
         }));
         rows
     }
+}
+
+/// When each phase began.
+fn phases(timeline: &PhaseTimeline) -> String {
+    let clock = match timeline.source {
+        PhaseSource::Vehicle => "T+ in s, from the vehicle's frames",
+        PhaseSource::Telemetry => "the station's clock in s, from the ground station's telemetry",
+    };
+    let spans = &timeline.spans;
+    let began = spans.iter().take(PHASES_SHOWN).map(|span| format!("{} {:.2}", span.phase, span.from_s));
+    let began = began.collect::<Vec<_>>().join(", ");
+    let more = spans.len().saturating_sub(PHASES_SHOWN) as u64 + timeline.further_changes;
+    let more = if more > 0 { format!(" and {}", counted(more, "more change")) } else { String::new() };
+    format!("{began}{more} ({clock})")
 }
 
 /// How many there are, and which of them lack something.

@@ -121,7 +121,6 @@ impl Flight {
         let found = again.and_then(|(_, findings)| findings);
         info.note_again(&recording, found);
         let (source, track) = track(&recording, &decisions);
-        let burning = |sample: &&Sample| sample.phase.is_some_and(Phase::in_landing_burn);
         let is_ignition = |event: &&FlightEvent| event.phase == TdPhase::TD_PHASE_IGNITION;
         let ignited = info.events.iter().find(is_ignition);
         let clocks = &recording.clocks;
@@ -129,9 +128,7 @@ impl Flight {
         let zero_s = if source == Some(RECEIVED) { heard_zero_s() } else { Some(0.0) };
         let found = || info.findings.iter().flatten();
         Self {
-            ignition_s: ignited
-                .map(|event| event.at_s + zero_s.unwrap_or(0.0))
-                .or_else(|| track.iter().find(burning).map(|sample| sample.time_s)),
+            ignition_s: ignited.map(|event| event.at_s + zero_s.unwrap_or(0.0)),
             touchdown_s: recording.contact_s(),
             events: info.events.clone(),
             zero_s,

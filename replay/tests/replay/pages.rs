@@ -65,7 +65,7 @@ fn the_report_states_the_verdict_first_and_then_why() {
         let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|<a href=\"geo:35.34|Findings, causes first|\
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
             Place from above, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
-            <td>contact</td>|Inferred at the end: impulse |\
+            <td>touchdown</td>|Inferred at the end: impulse |\
             Path from the south, m|>later plans</span>|>plan at ignition</span>|>nose</span>|>flown</span>|\
             Path from the east, m|Path from above, m|Level speed, m/s|Rotation rate, deg/s|Gimbal pitch, deg|\
             Gimbal yaw, deg|Thrust, N|Where each plan ends, less where it did, m|Wind towards north, m/s|\
@@ -164,6 +164,27 @@ fn the_report_of_a_motor_that_never_ignited_has_no_thrust() {
     }
 }
 
+/// The first screen of this report is the one in the gallery of docs/README.md; `UPDATE_PICTURES`
+/// makes it so.
+fn regress_the_picture_of_a_report(page: &str) {
+    let between = |from: &str, to: &str| page.split_once(from).unwrap().1.split_once(to).unwrap().0;
+    let style = between("<style>", "</style>");
+    let screen = between("<body>", "<h2").replace("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ");
+    let (screen, _) = screen.rsplit_once("</div></div>").unwrap();
+    let first = screen.find("<h1").unwrap();
+    let picture = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 1240 640\"><foreignObject width=\"1240\" height=\"640\">\
+         <body xmlns=\"http://www.w3.org/1999/xhtml\"><style>{style}</style>{}</div></div></body></foreignObject></svg>\n",
+        &screen[first..]
+    );
+    roxmltree::Document::parse(&picture).unwrap();
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/report.svg");
+    if std::env::var_os("UPDATE_PICTURES").is_some() {
+        std::fs::write(path, &picture).unwrap();
+    }
+    assert!(std::fs::read_to_string(path).unwrap_or_default() == picture, "docs/report.svg is stale");
+}
+
 /// From the pad, by the mission's own words: the moments of the ascent, and each stage in the
 /// pictures of the place.
 #[test]
@@ -172,9 +193,10 @@ fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
     recipe.mission_toml = toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
     recipe.mission = flight::vehicles::mission::from_toml(&recipe.mission_toml, "mk2").unwrap();
     let page = page_of(&fly_recipe(&recipe).log);
-    let moments = ["lift-off", "burn-out", "separation", "apogee", "ignition", "contact"];
+    let moments = ["lift-off", "burnout", "apogee", "ignition", "thrust", "touchdown"];
     let cells = moments.map(|moment| format!("<td>{moment}</td>"));
     has_in_order(&page, &cells.each_ref().map(String::as_str));
+    regress_the_picture_of_a_report(&page);
     for stage in ["ascent", "fall", "burn"] {
         assert!(page.matches(&format!("\">{stage}</span>")).count() >= 2, "{stage}");
     }

@@ -180,7 +180,7 @@ const THRUST_MIN_M_S2: f64 = 4.0;
 /// was only commanded, and the acceleration as soon as it is estimated.
 fn gives_thrust(vehicle: &Vehicle) -> bool {
     let phase = match vehicle.phase_now() {
-        Some(TdPhase::TD_PHASE_BOOST) => vehicle.has_lifted,
+        Some(TdPhase::TD_PHASE_BOOST) => vehicle.has_lifted(),
         phase => phase == Some(TdPhase::TD_PHASE_POWERED),
     };
     let is_measured = |change: Change| {

@@ -264,6 +264,10 @@ impl Rig {
     /// The event of a new phase in flight, at the height that was sent last.
     fn flight_events(&mut self) {
         let (number, height) = (self.phase as usize, self.model.vehicle.height_m());
+        let moves = self.model.vehicle.best_motion().is_some_and(|motion| motion.value.climb_m_s > 1.0);
+        if self.phase == TdPhase::TD_PHASE_BOOST && !moves {
+            return;
+        }
         let (events, released_at) = &mut self.flown;
         let place = number.checked_sub(TdPhase::TD_PHASE_BOOST as usize);
         let (Some(place), 0) = (place, events.entered >> number & 1) else { return };

@@ -557,7 +557,7 @@ pub(super) struct EventReporter {
 impl EventReporter {
     /// The message to send now.
     pub(super) fn due(&mut self, vehicle: &VehicleState<'_>, boot: u32, now_s: f64) -> Option<MavMessage> {
-        let message = telemetry::events(vehicle.findings.events(), boot)?;
+        let message = telemetry::events(&vehicle.findings.events, boot)?;
         let MavMessage::TD_EVENTS(TD_EVENTS_DATA { entered, .. }) = message else { return None };
         if now_s < self.due_s && entered == self.entered {
             return None;

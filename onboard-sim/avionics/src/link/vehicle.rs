@@ -172,8 +172,8 @@ impl<'a> VehicleState<'a> {
     /// ascent motor on a pad and lets the vehicle fall elsewhere (see
     /// [`flight::computer::flight_time_s`]).
     pub fn since_zero_s(&self) -> Option<f64> {
-        let air = self.airborne()?;
-        Some(self.judged.map_or(air.flown.time_s, |judged| judged.time_s - air.released_at_s))
+        let touchdown = self.findings.events.of(Phase::Touchdown);
+        touchdown.map(|(at_s, _)| at_s).or_else(|| Some(self.airborne()?.flown.time_s))
     }
 
     /// Where it is and how it moves.

@@ -1,39 +1,38 @@
 //! The events of a flight, each with its time and height: the one source of both for every screen,
 //! log and report.
 
-use super::SensedInput;
 use super::findings::LEGS_M;
+use super::{Computer, SensedInput};
+use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Mode, Phase};
 
 /// Time since the release, s, and height of the feet above the pad, m.
 pub type At = (f64, f64);
 
-/// The first entry of each phase.
+/// The first entry of each phase; of `Boost` the lift-off, of `Touchdown` the first contact.
 #[derive(Debug, Clone, Default)]
-pub struct FlightEvents {
-    entered: [Option<At>; Phase::ALL.len()],
-    highest: Option<At>,
-}
+pub struct FlightEvents([Option<At>; Phase::ALL.len()]);
 
 impl FlightEvents {
-    /// The event that begins a phase: of `Deploy` the highest point of an ascent, of `Touchdown` the
-    /// first contact, otherwise the frame that entered it.
+    /// The event that begins a phase.
     pub fn of(&self, phase: Phase) -> Option<At> {
-        self.entered[usize::from(phase.index())]
+        self.0[usize::from(phase.index())]
     }
 
     /// Looks at a frame in the air.
-    pub(super) fn note(&mut self, mode: &Mode, released_at_s: f64, flown: &SensedInput, height_m: f64) {
-        let now = (flown.time_s, height_m);
-        let rises = mode.phase.before_apogee();
-        if rises && self.highest.is_none_or(|(_, highest_m)| height_m > highest_m) {
-            self.highest = Some(now);
+    pub(super) fn note(&mut self, computer: &Computer, flown: &SensedInput, estimate: &Estimate) {
+        let (&Mode { phase, entered_at_s, .. }, pilot) = (computer.mode(), computer.pilot());
+        let height_m = pilot.feet_height_m(estimate);
+        let mut set = |phase: Phase, at_s: f64| {
+            self.0[usize::from(phase.index())].get_or_insert((at_s, height_m));
+        };
+        match phase {
+            Phase::Boost if pilot.ascent.has_lifted_off() => set(phase, flown.time_s),
+            Phase::Boost => {}
+            _ => set(phase, entered_at_s - computer.released_at_s().unwrap_or(0.0)),
         }
-        let entered = (mode.entered_at_s - released_at_s, height_m);
-        let at = self.highest.filter(|_| mode.phase == Phase::Deploy).unwrap_or(entered);
-        self.entered[usize::from(mode.phase.index())].get_or_insert(at);
-        if flown.contact && !rises && height_m < LEGS_M {
-            self.entered[usize::from(Phase::Touchdown.index())].get_or_insert(now);
+        if flown.contact && !phase.before_apogee() && height_m < LEGS_M {
+            set(Phase::Touchdown, flown.time_s);
         }
     }
 }

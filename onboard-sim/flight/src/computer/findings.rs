@@ -161,16 +161,11 @@ pub struct Findings {
     watches: BTreeMap<Sign, SignWatch>,
     found: Vec<Finding>,
     thrust_over_weight: Option<f64>,
-    /// What happened as intended, too.
-    events: FlightEvents,
+    /// The events of the flight so far.
+    pub events: FlightEvents,
 }
 
 impl Findings {
-    /// The events of the flight so far.
-    pub fn events(&self) -> &FlightEvents {
-        &self.events
-    }
-
     /// Thrust over weight when a foot first touched the ground in the landing burn.
     pub fn thrust_over_weight_at_contact(&self) -> Option<f64> {
         self.thrust_over_weight
@@ -179,10 +174,7 @@ impl Findings {
     /// Looks at the computer after a frame.
     pub fn note(&mut self, computer: &Computer) {
         let Some((flown, estimate)) = computer.flown().zip(computer.pilot().estimate()) else { return };
-        if let Some(released_at_s) = computer.released_at_s() {
-            let height_m = computer.pilot().feet_height_m(estimate);
-            self.events.note(computer.mode(), released_at_s, &flown, height_m);
-        }
+        self.events.note(computer, &flown, estimate);
         self.watcher.take(computer, &flown, estimate);
         if flown.contact && computer.pilot().ignited_at_s().is_some() && self.thrust_over_weight.is_none() {
             let (thrust_n, weight_n) = computer.pilot().thrust_and_weight_n(flown.time_s);

@@ -24,7 +24,7 @@ pub(super) fn html(flight: &Flight, info: &Info, drawn: &[Drawn]) -> String {
         findings(info, drawn),
         limits(info),
         place::maps(flight),
-        place::moments_table(flight),
+        place::events_table(flight),
     )
 }
 

@@ -6,8 +6,8 @@ use flight::estimation::estimator::Estimate;
 use flight::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 use flight::vehicle::rigid::RigidState;
 use protocol::log::flight_v1::AidStatus;
+use protocol::reported::FlightEvent;
 
-use super::place::{Moment, moments};
 use super::{COMPONENTS, DEGREES, HEIGHT};
 use crate::findings::FINS;
 use crate::log::{Clock, ClockTime};
@@ -90,8 +90,8 @@ fn of_landing(flight: &Flight) -> Vec<Picture<'_>> {
         .line("barometer", "thin", flight.framed(|frame| frame.input.measured.pressure_altitude_m))
         .line("flown", "a", flight.flown(|state| state[HEIGHT]))
         .line(PLANNED, "b", flight.planned_first(|state| state[HEIGHT]));
-    let shown = moments(flight).into_iter().filter(|moment| ["apogee", "ignition"].contains(&moment.name));
-    let place = |Moment { name, at_s, height_m, .. }: Moment| {
+    let shown = flight.events.iter().filter(|event| ["apogee", "ignition"].contains(&event.name));
+    let place = |&FlightEvent { name, at_s, height_m, .. }: &FlightEvent| {
         (at_s, height_m, "place", format!("{name} {height_m:.0} m"))
     };
     (height.chart.places, height.chart.named, height.chart.size_px) =

@@ -1,13 +1,13 @@
-//! Where the vehicle was: its main moments, and the place from above.
+//! Where the vehicle was: the events of its flight, and the place from above.
 
 use flight::rules::phase::Phase;
 use protocol::field::{Field, Kind};
 use protocol::motion::Degrees;
-use protocol::reported::{event_of, phase_from_number};
+use protocol::reported::FlightEvent;
 use sim::wire::field::{PAD_FACT, RUN_FACT, pad_of};
 
 use crate::report::chart::{Chart, Line, line};
-use crate::report::html::table;
+use crate::report::html::{paragraph, table};
 use crate::report::track::{Flight, Part, Sample, State, planned};
 
 /// A stage of the flight: its name, its class, and whether a phase belongs to it.
@@ -138,63 +138,22 @@ fn stages(flight: &Flight) -> Vec<Line> {
 /// Events that the page does not show.
 const UNIMPORTANT: [&str; 3] = ["falls", "ready", "over"];
 
-/// A moment of the flight.
-pub(super) struct Moment<'a> {
-    pub(super) name: &'static str,
-    /// On the report's axis, s.
-    pub(super) at_s: f64,
-    pub(super) height_m: f64,
-    /// The vehicle reported its time and height; otherwise they are those of the track.
-    is_reported: bool,
-    sample: Option<&'a Sample>,
-}
-
-pub(super) fn moments_table(flight: &Flight) -> String {
-    let row = |moment: Moment| {
-        let near = if moment.is_reported { "" } else { "≈ " };
-        let tenth = |value: f64| format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
-        let [north, east, _, level_m_s, up_m_s, ..] =
-            moment.sample.map_or([f64::NAN; 7], |sample| sample.state);
-        let [at_s, height] = [format!("{:.2}", moment.at_s), tenth(moment.height_m)];
-        let cells = [format!("{near}{at_s}"), format!("{near}{height}")].into_iter();
-        let track = [north, east, level_m_s, up_m_s].map(tenth);
-        std::iter::once(moment.name.to_owned()).chain(cells).chain(track).collect()
-    };
-    let time = format!("#{}", flight.axis_name());
-    let heads = ["moment", &time, "#height, m", "#north, m", "#east, m", "#level, m/s", "#up, m/s"];
-    table(&heads, moments(flight).into_iter().map(row).collect::<Vec<Vec<String>>>())
-}
-
-/// What happened when, as far as it did.
-pub(super) fn moments<'a>(flight: &'a Flight) -> Vec<Moment<'a>> {
-    let flown = || flight.track.iter().filter(|sample| flight.has(Part::Air, sample.time_s));
-    let near = |name, sample: Option<&'a Sample>| {
-        // Telemetry may begin without a place.
-        let sample = sample.filter(|sample| sample.state[..5].iter().all(|value| value.is_finite()))?;
-        let (at_s, height_m) = (flight.axis_s(sample.time_s), sample.state[2]);
-        Some(Moment { name, at_s, height_m, is_reported: false, sample: Some(sample) })
-    };
-    let at = |time_s: f64| flown().find(|sample| sample.time_s >= time_s).or_else(|| flown().next_back());
-    let reported = flight.events.iter().map(|event| Moment {
-        name: event.name,
-        at_s: event.at_s,
-        height_m: event.height_m,
-        is_reported: true,
-        sample: at(flight.time_s(event.at_s)),
-    });
-    let mut moments: Vec<Moment> = reported.collect();
-    if moments.is_empty() {
-        moments.extend(Phase::ALL.into_iter().filter_map(|phase| {
-            let name = phase_from_number(phase.index().into()).and_then(event_of)?;
-            near(name, flown().find(|sample| sample.phase == Some(phase)))
-        }));
+/// The events as the vehicle reports them, each with the motion of the track then.
+pub(super) fn events_table(flight: &Flight) -> String {
+    if flight.events.is_empty() {
+        return paragraph("The vehicle reported no times and heights of events.");
     }
-    let mut pairs = flight.recording.frames.windows(2).map(|pair| (&pair[0].input, &pair[1].input));
-    let separated = pairs.find(|(before, now)| before.booster_attached && !now.booster_attached);
-    moments.extend(near("separation", separated.and_then(|(_, now)| at(now.time_s))));
-    moments.retain(|moment| !UNIMPORTANT.contains(&moment.name));
-    moments.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
-    moments
+    let row = |event: &FlightEvent| {
+        let time_s = flight.time_s(event.at_s);
+        let then = flight.track.iter().find(|sample| sample.time_s >= time_s).or(flight.track.last());
+        let [north, east, _, level_m_s, up_m_s, ..] = then.map_or([f64::NAN; 7], |sample| sample.state);
+        let tenth = |value: f64| format!("{:.1}", (10.0 * value).round() / 10.0 + 0.0);
+        let cells = [event.height_m, north, east, level_m_s, up_m_s].map(tenth);
+        [event.name.to_owned(), format!("{:.2}", event.at_s)].into_iter().chain(cells).collect()
+    };
+    let heads = ["event", "#T+, s", "#height, m", "#north, m", "#east, m", "#level, m/s", "#up, m/s"];
+    let shown = flight.events.iter().filter(|event| !UNIMPORTANT.contains(&event.name));
+    table(&heads, shown.map(row).collect::<Vec<Vec<String>>>())
 }
 
 #[cfg(test)]

@@ -67,7 +67,7 @@ pub fn message(message_id: u32, state: &VehicleState<'_>, identity: Identity) ->
         TD_OPERATOR_DATA::ID => ours::operator(state, boot),
         // It matters before the flight only, and there it costs no position.
         TD_MISSION_DATA::ID => state.phase().on_pad().then(|| ours::mission(state, boot)),
-        TD_EVENTS_DATA::ID => ours::events(state.findings.events(), boot),
+        TD_EVENTS_DATA::ID => ours::events(&state.findings.events, boot),
         TD_DESCENT_DATA::ID => motion::descent(state, boot),
         ESTIMATOR_STATUS_DATA::ID => motion::estimator(state),
         HIGHRES_IMU_DATA::ID => Some(motion::imu(state)),

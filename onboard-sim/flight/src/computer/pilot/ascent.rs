@@ -6,7 +6,6 @@ use serde::{Deserialize, Serialize};
 use super::vertical_speed::{APART_OF_TWO_M_S, RATE_OVER_S, VerticalSpeeds};
 use crate::computer::messages::Severity;
 use crate::computer::pad::ANSWERING_RAD;
-use crate::estimation::estimator::Estimate;
 use crate::rules::phase::{Event, Phase};
 use crate::text::{Text, text};
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -255,9 +254,8 @@ fn lasts_s(before_s: f64, is_now: Option<bool>, frame_s: f64) -> f64 {
     if is_now.unwrap_or(before_s > 0.0) { before_s + frame_s } else { 0.0 }
 }
 
-/// The crew message for an event.
-pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Severity, Text)> {
-    let state = &estimate.state;
+/// The crew message for an event, with the height of the feet, m, and the vertical speed, m/s.
+pub(super) fn words_of_ascent(event: Event, height_m: f64, climb_m_s: f64) -> Option<(Severity, Text)> {
     let message = match event {
         Event::LiftOff => (Severity::Notice, text!("LIFT-OFF")),
         Event::NoLiftOff => (
@@ -265,19 +263,12 @@ pub(super) fn words_of_ascent(event: Event, estimate: &Estimate) -> Option<(Seve
             text!("no lift-off within {LIFT_OFF_WITHIN_S} s: the ascent motor may still light"),
         ),
         Event::Burnout => {
-            let words = text!(
-                "ascent motor burnt out at {:.0} m, {:.0} m/s",
-                state.position_m.z,
-                state.velocity_m_s.z
-            );
-            (Severity::Notice, words)
+            (Severity::Notice, text!("ascent motor burnt out at {height_m:.0} m, {climb_m_s:.0} m/s"))
         }
         Event::Apogee { booster_attached: true } => {
             (Severity::Critical, text!("the booster has not separated: no landing, parachute"))
         }
-        Event::Apogee { booster_attached: false } => {
-            (Severity::Notice, text!("APOGEE at {:.0} m", state.position_m.z))
-        }
+        Event::Apogee { booster_attached: false } => (Severity::Notice, text!("APOGEE at {height_m:.0} m")),
         _ => return None,
     };
     Some(message)

@@ -221,7 +221,8 @@ impl Pilot {
         if let Event::Apogee { .. } = event {
             self.apogee_m = estimate.state.position_m.z;
         }
-        if let Some((severity, words)) = words_of_ascent(event, estimate) {
+        let (height_m, climb_m_s) = (self.feet_height_m(estimate), estimate.state.velocity_m_s.z);
+        if let Some((severity, words)) = words_of_ascent(event, height_m, climb_m_s) {
             table.report(severity, words);
         }
         self.try_apply(table, event, input.time_s);
