@@ -139,7 +139,7 @@ impl LoggedComputer {
         if self.compares_digests {
             return Ok(self.computer.record(&read, &output));
         }
-        let output = output_to_log(&output, self.computer(), Default::default());
+        let output = output_to_log(&output, self.computer(), ComputerOutput::default());
         Ok(ComputerFrame { input: frame.input.clone(), output, state_digest: frame.state_digest })
     }
 

@@ -321,10 +321,10 @@ mod tests {
             };
             let input =
                 Input { sensed, requests: &requests, rehearsed: rehearsed.as_ref(), plan_ready: flags[8] };
-            let bytes = input_to_log(&input, Default::default()).encode_to_vec();
+            let bytes = input_to_log(&input, v1::ComputerInput::default()).encode_to_vec();
             let read = input_from_log(&v1::ComputerInput::decode(bytes.as_slice()).unwrap()).unwrap();
             // Compared as bytes as well, because a NaN never equals itself.
-            prop_assert_eq!(input_to_log(&read.input(), Default::default()).encode_to_vec(), bytes);
+            prop_assert_eq!(input_to_log(&read.input(), v1::ComputerInput::default()).encode_to_vec(), bytes);
             prop_assert_eq!(read.rehearsed, rehearsed);
             prop_assert_eq!(read.requests.len(), requests.len());
             let fields = |requests: &[Request]| {

@@ -197,22 +197,23 @@ type Agreed = (Proposal, Operator);
 
 impl Computer {
     /// Decides a request.
+    #[expect(clippy::result_large_err, reason = "a frame allocates nothing")]
     pub(super) fn answer(&mut self, request: &Request) -> Answer {
         let mode = *self.table.mode();
         let time_s = self.table.time_s;
         let Request { command, uplink, station, by, .. } = *request;
         if let Some(reason) = self.why_not_of(request) {
-            return self.deny(command, reason);
+            return self.deny(command, &reason);
         }
         // Any other command ends a running check first.
         let check_ended = !matches!(command, CrewCommand::Check | CrewCommand::CheckStill)
             && self.end_check(command.name());
         if check_ended && matches!(command, CrewCommand::Arm | CrewCommand::Start) {
             let reason = "a check of the vehicle ran, and has ended now; ask again";
-            return Answer { ending: Ending::NotNow, ..self.deny(command, text!("{reason}")) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, reason) };
         }
         if let Some(reason) = self.why_not_here(request) {
-            return self.deny(command, reason);
+            return self.deny(command, &reason);
         }
         if let (CrewCommand::Disarm, Some(station)) = (command, station) {
             self.crew.disarmed = Some((time_s, station));
@@ -309,6 +310,7 @@ impl Computer {
 
     /// Proposes or confirms, if two people must agree. A new proposal and a wrong confirmation
     /// return an error.
+    #[expect(clippy::result_large_err, reason = "a frame allocates nothing")]
     fn agree(&mut self, request: &Request) -> Result<Option<Agreed>, Answer> {
         let Request { command, station, by, confirms, .. } = *request;
         let (first, act) = match (self.input.people, act_of(command)) {
@@ -316,7 +318,7 @@ impl Computer {
             (None | Some(People::One), _) | (Some(People::Two { .. }), None) => return Ok(None),
         };
         let (Some(by), Some(station)) = (by, station) else {
-            let reason = text!("two people with a key each, at a station, must agree");
+            let reason = "two people with a key each, at a station, must agree";
             return Err(self.deny(command, reason));
         };
         let time_s = self.table.time_s;
@@ -330,7 +332,7 @@ impl Computer {
                 }
                 Err(Answer { ending: Ending::ToConfirm, reason: Some(reason) })
             }
-            Reply::Refused(refusal) => Err(self.deny(command, why_no_agreement(refusal, act, time_s))),
+            Reply::Refused(refusal) => Err(self.deny(command, &why_no_agreement(refusal, act, time_s))),
         }
     }
 
@@ -365,9 +367,9 @@ impl Computer {
         }
     }
 
-    pub(super) fn deny(&mut self, command: CrewCommand, reason: Text) -> Answer {
+    pub(super) fn deny(&mut self, command: CrewCommand, reason: &str) -> Answer {
         self.table.report(Severity::Warning, text!("{} refused: {reason}", command.name()));
-        Answer { ending: Ending::Denied, reason: Some(reason) }
+        Answer { ending: Ending::Denied, reason: Some(text!("{reason}")) }
     }
 
     fn tap(&mut self, by: Option<Operator>) -> Answer {
@@ -379,32 +381,32 @@ impl Computer {
             Some(tapping) => text!("{} taps", tapping.by),
             None => text!("no countdown that two people have started"),
         };
-        self.deny(CrewCommand::Tap, reason)
+        self.deny(CrewCommand::Tap, &reason)
     }
 
     /// A station takes command from a silent one.
     fn take_command(&mut self, request: &Request) -> Answer {
         let Some(station) = request.station else {
-            return self.deny(CrewCommand::TakeCommand, text!("no station"));
+            return self.deny(CrewCommand::TakeCommand, "no station");
         };
         let armed = self.table.mode().interlocks.armed;
         let Some(Commander { station: before, age_s, by: before_by, .. }) =
             self.input.commander.filter(|_| armed)
         else {
-            return self.deny(CrewCommand::TakeCommand, text!("no station has armed the vehicle"));
+            return self.deny(CrewCommand::TakeCommand, "no station has armed the vehicle");
         };
         if before == station {
             return Answer::ACCEPTED;
         }
         let (old, new) = (named(before, before_by), named(station, request.by));
         if age_s <= UPLINK_PROVEN_S {
-            return self.deny(CrewCommand::TakeCommand, text!("{old} was received {age_s:.1} s ago"));
+            return self.deny(CrewCommand::TakeCommand, &text!("{old} was received {age_s:.1} s ago"));
         }
         // One person cannot both command and give the dead-man confirmations.
         if let (Some(tapping), Some(by)) = (self.crew.two_person.tapping, request.by)
             && tapping.by.number == by.number
         {
-            return self.deny(CrewCommand::TakeCommand, text!("{by} taps: hold the countdown first"));
+            return self.deny(CrewCommand::TakeCommand, &text!("{by} taps: hold the countdown first"));
         }
         // A role hands over to the same role; range safety may always take over.
         if let (Some(before_by), Some(by)) = (before_by, request.by)
@@ -413,7 +415,7 @@ impl Computer {
         {
             let wanted = before_by.role.name();
             let reason = text!("only {wanted} or RANGE SAFETY takes over from {old}");
-            return self.deny(CrewCommand::TakeCommand, reason);
+            return self.deny(CrewCommand::TakeCommand, &reason);
         }
         let silence =
             if age_s.is_finite() { text!("silent for {age_s:.0} s") } else { text!("never received") };

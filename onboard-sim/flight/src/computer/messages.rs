@@ -25,6 +25,7 @@ pub enum Severity {
 
 /// One message of the flight computer.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[expect(clippy::large_enum_variant, reason = "a frame allocates nothing")]
 pub enum CrewMessage {
     /// Text for the crew.
     Text {

@@ -12,7 +12,7 @@ use crate::guidance::powered::ControlLevel;
 use crate::rules::phase::{Effect, Effects, Event, Latch, Mode, Phase, Refusal, transition};
 use crate::text::text;
 
-/// Messages of a frame, in order; three is the most in a nominal flight.
+/// Messages of a frame, in order: three at most in a nominal flight. One without room is left out.
 pub type Messages = ArrayVec<CrewMessage, 16>;
 
 /// Phase, latches, and the messages of this frame.
@@ -76,19 +76,15 @@ impl PhaseTable {
             self.report(severity, words);
         }
         if self.mode.phase != before.phase {
-            self.send(CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase });
+            let changed = CrewMessage::PhaseChanged { from: before.phase, to: self.mode.phase };
+            let _ = self.messages.try_push(changed);
         }
         Ok(next.effects)
     }
 
     /// Sends a message to the crew.
     pub(crate) fn report(&mut self, severity: Severity, words: impl Display) {
-        self.send(CrewMessage::Text { severity, text: text!("{words}") });
-    }
-
-    /// A message without room is left out.
-    fn send(&mut self, message: CrewMessage) {
-        let _ = self.messages.try_push(message);
+        let _ = self.messages.try_push(CrewMessage::Text { severity, text: text!("{words}") });
     }
 
     /// Takes the messages of this frame, in order.

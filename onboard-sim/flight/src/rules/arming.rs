@@ -114,7 +114,10 @@ pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
     // Before the checks of derived values: the faulty sensor is named, not the value that it
     // spoils.
     checks.extend(
-        SENSORS.into_iter().zip(&input.sensor_defects).map(|(name, defect)| Check::sensor(name, *defect)),
+        SENSORS
+            .into_iter()
+            .zip(&input.sensor_defects)
+            .map(|(name, defect)| Check::sensor(name, defect.as_ref())),
     );
     checks.extend([
         Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
@@ -241,8 +244,8 @@ impl Check {
     }
 
     /// A check of a sensor; the defect contains the sensor's name.
-    fn sensor(name: &'static str, defect: Option<Text>) -> Self {
-        let found = defect.unwrap_or_else(|| text!("speaks"));
+    fn sensor(name: &'static str, defect: Option<&Text>) -> Self {
+        let found = defect.copied().unwrap_or_else(|| text!("speaks"));
         Self { name, passed: defect.is_none(), found, required: Text::new() }
     }
 

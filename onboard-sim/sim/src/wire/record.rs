@@ -72,8 +72,8 @@ impl Watch for LastFrame {
     fn decided(&mut self, input: &Input<'_>, output: &Output, computer: &Computer) {
         // A computer that has restarted takes the rehearsal again.
         let rehearsed_before = self.rehearsed && input.frame == self.next;
-        self.frame =
-            Some(Box::new(frame_to_log(input, output, computer, rehearsed_before, Default::default())));
+        let record = frame_to_log(input, output, computer, rehearsed_before, ComputerFrame::default());
+        self.frame = Some(Box::new(record));
         (self.rehearsed, self.next) = (computer.rehearsed().is_some(), input.frame + 1);
     }
 }

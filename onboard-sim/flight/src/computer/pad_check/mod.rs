@@ -357,7 +357,7 @@ impl Computer {
     }
 
     /// Why no check may run now; `None` if it may.
-    fn why_no_check(&self) -> Option<Text> {
+    fn why_no_check(&self) -> Option<&'static str> {
         let mode = self.table.mode();
         let locks = mode.interlocks;
         let reason = match mode.phase {
@@ -368,7 +368,7 @@ impl Computer {
             Phase::Safe if self.self_test != SelfTest::Failed => "the self-test is not over",
             _ => return None,
         };
-        Some(text!("{reason}"))
+        Some(reason)
     }
 
     /// Begins a check. A running one continues: a repeated request does not restart it.
@@ -391,7 +391,7 @@ impl Computer {
     pub(super) fn see_check(&mut self, command: CrewCommand, by: Option<Operator>) -> Answer {
         let two = matches!(self.input.people, Some(People::Two { .. }));
         if let Err(reason) = self.pad_check.see(by, two) {
-            return Answer { ending: Ending::NotNow, ..self.deny(command, text!("{reason}")) };
+            return Answer { ending: Ending::NotNow, ..self.deny(command, reason) };
         }
         let who = by.map_or_else(|| text!("one person"), |by| text!("{by}"));
         let words =
@@ -422,7 +422,7 @@ impl Computer {
         }
         if let Some(reason) = self.why_no_check() {
             // In the air the pilot commands the surfaces from the next frame on.
-            self.end_check(&reason);
+            self.end_check(reason);
             return;
         }
         let command = self.pad_check.step(input, self.pilot.mission(), &self.arming);
