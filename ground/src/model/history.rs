@@ -14,7 +14,8 @@ pub(crate) const TIMELINE_MAX: usize = 64;
 /// What the review page shows.
 #[derive(Debug, Clone, Default)]
 pub struct History {
-    /// Each phase and when it began, since the start of the run: received, until its event is reported.
+    /// Each phase and when it began, since the start of the run: when it was received, until its
+    /// event is reported.
     pub timeline: Vec<(TdPhase, Duration)>,
     /// The longest time without a heartbeat in flight.
     pub silence: Duration,

@@ -145,8 +145,8 @@ const DASHES: [&str; 4] = ["none", "7 2", "2 2", "7 2 2 2"];
 /// is the direction of the wind, clockwise from north, which is up then; without it up is downwind.
 /// `None` without a circle.
 ///
-/// The lines of the field, as points north and east, m, are drawn where north is known. The position
-/// of the pad is written beside.
+/// The lines of the field, as points north and east, m, are drawn where north is known. The
+/// position of the pad is written beside.
 pub fn plan(
     winds: &[InWind],
     wind_from_deg: Option<f64>,

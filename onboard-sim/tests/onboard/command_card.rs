@@ -156,7 +156,7 @@ fn regress_the_picture_of_a_card() {
     let html = fs::read_to_string(directory.path().join("card").join("card.html")).unwrap();
     let between = |from: &str, to: &str| html.split_once(from).unwrap().1.split_once(to).unwrap().0;
     let picture = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 740 1060\"><foreignObject width=\"740\" height=\"1060\">\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 740 900\"><foreignObject width=\"740\" height=\"900\">\
          <body xmlns=\"http://www.w3.org/1999/xhtml\"><style>{} body{{background:#fff;padding:10px}}</style>\n\
          <section>{}</section></body></foreignObject></svg>\n",
         between("<style>", "</style>"),
