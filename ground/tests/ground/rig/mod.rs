@@ -161,7 +161,7 @@ impl Rig {
             let theirs = self.now / self.slower;
             if self.speaks
                 && theirs.subsec_millis().is_multiple_of(100)
-                && theirs.subsec_micros() % 1_000 == 0
+                && theirs.subsec_micros().is_multiple_of(1_000)
             {
                 if theirs.subsec_millis() == 0 {
                     self.heartbeat();

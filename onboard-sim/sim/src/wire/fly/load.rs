@@ -8,7 +8,7 @@ use crate::recipe::Recipe;
 use flight::computer::crew::{Answer, CrewCommand, Request};
 use flight::rules::arming;
 use flight::rules::phase::Phase;
-use flight::text::{Text, text};
+use flight::text::Text;
 use flight::vehicle::mission::StartPoint;
 use protocol::log::writer::LogHeader;
 
@@ -79,7 +79,7 @@ const READY_WITHIN_S: f64 = 10.0;
 /// Arms and starts once the checks pass.
 pub(super) struct AutoStart {
     pub(super) wanted: bool,
-    pub(super) refused: Option<Text>,
+    pub(super) refused: Option<String>,
     /// Arming and start were requested.
     pub(super) requested: bool,
     /// Why the countdown was held.
@@ -93,7 +93,7 @@ impl AutoStart {
         if self.requested && mode.phase.on_pad() && !mode.interlocks.armed && !vehicle.aborted() {
             // A reset has disarmed it. Only a person arms it again.
             let why = self.held.as_ref().map(|held| format!(": {held}")).unwrap_or_default();
-            self.refused.get_or_insert_with(|| text!("disarmed on the pad after it was started{why}"));
+            self.refused.get_or_insert_with(|| format!("disarmed on the pad after it was started{why}"));
         }
         if self.held.is_none() && mode.hold.is_some() {
             self.held = arming::first_refusal(&vehicle.arming_checks());
@@ -103,7 +103,7 @@ impl AutoStart {
             return Vec::new();
         }
         match arming::first_refusal(&vehicle.arming_checks()) {
-            Some(reason) if vehicle.time_s() > READY_WITHIN_S => self.refused = Some(reason),
+            Some(reason) if vehicle.time_s() > READY_WITHIN_S => self.refused = Some(reason.to_string()),
             Some(_) => {}
             None => {
                 (self.wanted, self.requested) = (false, true);
@@ -115,7 +115,10 @@ impl AutoStart {
 
     /// Takes the answer to the request.
     pub(super) fn on_answers(&mut self, answers: &[Answer]) {
-        self.refused = self.refused.take().or_else(|| answers.iter().find_map(|answer| answer.reason));
+        self.refused = self
+            .refused
+            .take()
+            .or_else(|| answers.iter().find_map(|answer| Some(answer.reason?.to_string())));
     }
 }
 

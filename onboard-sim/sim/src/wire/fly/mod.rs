@@ -16,7 +16,6 @@ use avionics::board::stream::OnTheAir;
 use flight::computer::FRAME_S;
 use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
-use flight::text::Text;
 pub use flight::vehicle::mission::StartPoint;
 pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
@@ -176,7 +175,7 @@ pub enum FlightEnd {
     /// Aborted before or without a landing.
     Aborted,
     /// Arming or starting was refused.
-    Refused(Text),
+    Refused(String),
     /// Stopped from outside before its end.
     Stopped,
 }
@@ -282,7 +281,7 @@ fn on_board(folder: &Path, options: &FlyOptions) -> Result<OnBoard, FlyError> {
 }
 
 /// How a flight has ended.
-fn outcome_of(vehicle: &Vehicle, refused: Option<Text>, stopped: bool) -> FlightEnd {
+fn outcome_of(vehicle: &Vehicle, refused: Option<String>, stopped: bool) -> FlightEnd {
     match (vehicle.judged().map(|judged| judged.landing.stands), refused) {
         // An abort stays an abort, whatever the landing; the verdict is reported separately.
         _ if vehicle.aborted() => FlightEnd::Aborted,

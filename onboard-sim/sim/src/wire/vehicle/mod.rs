@@ -240,6 +240,7 @@ impl Vehicle {
 
 /// An event that a vehicle reports.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "nearly all are messages")]
 pub enum VehicleEvent {
     Message(CrewMessage),
     /// The pilot took over a plan in this frame.
