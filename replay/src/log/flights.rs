@@ -357,7 +357,7 @@ mod tests {
         assert_eq!(lost(&[(1, 0), (2, 1), (2, 3), (1, 4), (2, 5)]), (vec![0, 0, 1, 1, 0], 1));
         assert_eq!(lost(&[(1, 0), (2, 0), (1, 0)]), (vec![0, 0, 0], 0));
         assert_eq!(lost(&[(1, 7), (1, 8)]), (vec![7, 0], 7));
-        // From 1, each channel or all together; then a channel of a counter from 0 that lost its first.
+        // From 1, each channel or all together; then one of a writer from 0 that lost its first.
         assert_eq!(lost(&[(1, 1), (2, 1), (1, 2), (2, 3)]), (vec![0, 0, 0, 1], 1));
         assert_eq!(lost(&[(1, 1), (2, 2), (1, 4)]), (vec![0, 0, 1], 1));
         assert_eq!(lost(&[(1, 1), (2, 0), (2, 1)]), (vec![0, 0, 0], 1));

@@ -163,8 +163,9 @@ fn data_out_of_range_are_refused() {
     assert!(matches!(error, WorldError::Motor { propellant_kg, .. } if propellant_kg > 0.19), "{error}");
 }
 
-/// Five steps at once end where they do one after the other, and have their mean rate: in a fall with moving fins, under the
-/// landing motor with a swinging gimbal, and while the parachute opens.
+/// Five steps at once end where they do one after the other, and have their mean rate: in a fall
+/// with moving fins, under the landing motor with a swinging gimbal, and while the parachute
+/// opens.
 #[test]
 fn a_stride_ends_where_its_steps_do() {
     let truth = Truth { wind_m_s: 6.0, ..Truth::default() };
