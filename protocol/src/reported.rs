@@ -89,15 +89,14 @@ impl FlightEvents {
         if message.boot_number != self.boot_number {
             *self = Self { boot_number: message.boot_number, received: Vec::new() };
         }
-        for (place, (at_ms, height_m)) in message.at_ms.into_iter().zip(message.height_m).enumerate() {
+        for (place, (at, height)) in message.at.into_iter().zip(message.height).enumerate() {
             let number = TdPhase::TD_PHASE_BOOST as u32 + place as u32;
             let phase = phase_from_number(number).filter(|_| message.entered >> number & 1 == 1);
             let Some((phase, name)) = phase.and_then(|phase| Some((phase, event_of(phase)?))) else {
                 continue;
             };
             self.received.retain(|event| event.phase != phase);
-            // As the vehicle computes its time: the same bits.
-            let (at_s, height_m) = (f64::from(at_ms) * 1e-3, f64::from(height_m));
+            let (at_s, height_m) = (f64::from(at) / 100.0, f64::from(height) / 10.0);
             self.received.push(FlightEvent { name, at_s, height_m, phase });
         }
         self.received.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
@@ -219,22 +218,18 @@ mod tests {
     /// A report is of one boot; what a restarted computer of that boot no longer reports remains.
     #[test]
     fn events_are_merged_within_a_boot_and_dropped_with_it() {
-        let report = |boot_number, phase: TdPhase, at_ms| {
+        let report = |boot_number, phase: TdPhase, at| {
             let mut data = TD_EVENTS_DATA { boot_number, entered: 1 << phase as u16, ..Default::default() };
             let place = phase as usize - TdPhase::TD_PHASE_BOOST as usize;
-            (data.at_ms[place], data.height_m[place]) = (at_ms, 51.4);
+            (data.at[place], data.height[place]) = (at, 514);
             data
         };
         let mut events = FlightEvents::default();
-        events.take(&report(1, TdPhase::TD_PHASE_IGNITION, 14_705));
-        events.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 7_240));
+        events.take(&report(1, TdPhase::TD_PHASE_IGNITION, 1_471));
+        events.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 724));
         let found: Vec<_> = events.received.iter().map(|event| (event.name, event.at_s)).collect();
-        // The bits of the vehicle's clock: frames of 5 ms.
-        assert_eq!(
-            found,
-            [("apogee", f64::from(1_448 * 5) * 1e-3), ("ignition", f64::from(2_941 * 5) * 1e-3)]
-        );
-        events.take(&report(2, TdPhase::TD_PHASE_CHUTE, 9_000));
+        assert_eq!(found, [("apogee", 7.24), ("ignition", 14.71)]);
+        events.take(&report(2, TdPhase::TD_PHASE_CHUTE, 900));
         assert_eq!(events.received.iter().map(|event| event.name).collect::<Vec<_>>(), ["parachute"]);
     }
 

@@ -272,8 +272,8 @@ impl Rig {
         let place = number.checked_sub(TdPhase::TD_PHASE_BOOST as usize);
         let (Some(place), 0) = (place, events.entered >> number & 1) else { return };
         events.boot_number = self.boot_number;
-        events.at_ms[place] = self.now.saturating_sub(*released_at).as_millis() as u32;
-        events.height_m[place] = height.map_or(0.0, |height| height.value as f32);
+        events.at[place] = (self.now.saturating_sub(*released_at).as_millis() / 10) as u16;
+        events.height[place] = height.map_or(0, |height| (10.0 * height.value).round() as i16);
         events.entered |= 1 << number;
         let message = MavMessage::TD_EVENTS(events.clone());
         self.receive(&message);

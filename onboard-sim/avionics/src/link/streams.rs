@@ -562,7 +562,7 @@ impl EventReporter {
         if now_s < self.due_s && entered == self.entered {
             return None;
         }
-        (self.entered, self.due_s) = (entered, now_s + SELDOM_S);
+        (self.entered, self.due_s) = (entered, now_s + 2.0 * SELDOM_S);
         Some(message)
     }
 }

@@ -259,9 +259,10 @@ pub fn events(events: &FlightEvents, boot_number: u32) -> Option<MavMessage> {
     let mut data = TD_EVENTS_DATA { boot_number, ..TD_EVENTS_DATA::default() };
     for phase in Phase::ALL {
         let place = phase.index().checked_sub(Phase::Boost.index());
-        if let Some((place, (at_s, height_m))) = place.zip(events.of(phase)) {
-            data.at_ms[usize::from(place)] = boot_ms(at_s);
-            data.height_m[usize::from(place)] = height_m as f32;
+        let at = events.of(phase).filter(|(at_s, _)| 100.0 * at_s < f64::from(u16::MAX));
+        if let Some((place, (at_s, height_m))) = place.zip(at) {
+            data.at[usize::from(place)] = libm::round(100.0 * at_s) as u16;
+            data.height[usize::from(place)] = libm::round(10.0 * height_m) as i16;
             data.entered |= 1 << phase.index();
         }
     }
