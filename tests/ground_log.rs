@@ -1,5 +1,6 @@
 //! The log of a ground station that flew a real vehicle: what it says agrees with the vehicle's own
 //! log.
+#![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::path::Path;
 
@@ -107,7 +108,7 @@ fn its_ignition_has_one_time_and_one_height(folder: &Path, own: &Ended, heard: &
         .args(["--replay", "ground.mcap", "--from", "POWERED"])
         .current_dir(folder)
         .env("TERM", "xterm-256color");
-    let screen = Terminal::start(&mut playback, (160, 50), false);
+    let screen = Terminal::start(&playback, (160, 50), false);
     for words in
         [format!("ignition {:.1}", number(at_s)), format!("{:.0} m, T+{:.1}", number(height_m), number(at_s))]
     {
