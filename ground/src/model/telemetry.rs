@@ -209,7 +209,7 @@ fn touchdown(at: [f32; 6], violated: TdLimit) -> Touchdown {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA, TD_FLIGHT_STATUS_DATA};
+    use protocol::dialect::{ATTITUDE_QUATERNION_DATA, LOCAL_POSITION_NED_DATA};
 
     const NOW: Duration = Duration::from_secs(1);
 
