@@ -133,8 +133,9 @@ impl DelayNs for Waits {
 
 /// The parts on their pins, and the card; `None` if a pin is not where this expects it.
 fn wired(chip: StandInChip) -> Option<(Parts<Wired>, SdCard<Spi, Waits>)> {
-    let board::Resources { mut pins, mut gpio1, mut gpio2, mut gpio3, mut gpio4, lpspi3, lpspi4, lpi2c1, .. } =
-        board::t41(board::instances());
+    let board::Resources {
+        mut pins, mut gpio1, mut gpio2, mut gpio3, mut gpio4, lpspi3, lpspi4, lpi2c1, ..
+    } = board::t41(board::instances());
     // A switch to ground is high while it is open; an igniter without current is low.
     let (up, down) = (Some(PullKeeper::Pullup22k), Some(PullKeeper::Pulldown100k));
     configure(&mut pins.p31, Config::zero().set_pull_keeper(up));

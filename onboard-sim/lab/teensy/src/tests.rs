@@ -746,6 +746,8 @@ fn a_part_that_does_not_start_is_silent() {
     }
     let checks = frames.computer().arming_checks();
     for (name, found) in [("gyro", "gyro silent for 5.0 s"), ("barometer", "barometer silent for 5.0 s")] {
-        assert!(checks.iter().any(|check| check.name == name && !check.passed && check.found.as_str() == found));
+        assert!(
+            checks.iter().any(|check| check.name == name && !check.passed && check.found.as_str() == found)
+        );
     }
 }
