@@ -18,6 +18,15 @@ pub fn wait_for_content(path: &Path) {
     }
 }
 
+/// Waits until a text file contains these words.
+pub fn wait_for_text(path: &Path, words: &str) {
+    let deadline = now() + PATIENCE;
+    while !std::fs::read_to_string(path).is_ok_and(|text| text.contains(words)) {
+        assert!(!left(deadline).is_zero(), "{} does not contain {words}", path.display());
+        std::thread::sleep(POLL_INTERVAL);
+    }
+}
+
 /// Waits until a file is removed.
 pub fn wait_for_removal(path: &Path) {
     let deadline = now() + PATIENCE;

@@ -1,6 +1,6 @@
 //! Screens that are attached to a station in another process, and what they show when it dies.
 
-use e2e::{ABORT, Signal};
+use e2e::{ABORT, Signal, wait_for_text};
 
 use super::rig::Pad;
 
@@ -69,6 +69,8 @@ fn the_station_after_one_that_hung_reports_the_unconfirmed_abort() {
     first.signal(Signal::SIGSTOP);
     screen.type_bytes(b"\x18\r");
     screen.wait_for(" ABORT NOT SENT: the station hangs");
+    // An abort does not wait for the disk.
+    wait_for_text(&pad.folder.path().join("touchdown-unfinished.json"), r#""abort":""#);
     screen.signal(Signal::SIGKILL);
     screen.wait_for_end();
     first.signal(Signal::SIGKILL);
