@@ -20,7 +20,7 @@ mod time;
 mod udp_proxy;
 mod window;
 
-pub use appears::{wait_for_content, wait_for_text, wait_for_removal};
+pub use appears::{wait_for_content, wait_for_removal, wait_for_text};
 pub use bare_ground::{ABORT, ACCEPTED, ARM, BareGround, START, command_frame, heartbeat_frame};
 pub use flight::{
     auto_ground, expect_identical_replay, expect_landing, landed_vehicle, last_time_s, vehicle,
