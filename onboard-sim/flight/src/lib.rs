@@ -12,7 +12,7 @@
 //! * [`control`] turns a commanded direction into commands for gimbal and fins.
 //! * [`rules`] decides the permitted actions: phases, checks and limits.
 //! * [`computer`] is the flight computer: one frame, from sensor samples to commands.
-//! * [`text`] formats the texts for the crew in fixed memory.
+//! * [`text`](mod@text) formats the texts for the crew in fixed memory.
 //!
 //! With the feature `files`, `vehicles` reads the files that describe a vehicle. The crate [`ocp`]
 //! solves the landing problem.
