@@ -46,19 +46,7 @@ fn a_first_flight_follows_its_page() {
     station.wait_for_line("type next: ground attach");
     let mut screen = Terminal::start(attach.env("TERM", "xterm-256color"), SIZE, false);
     screen.wait_for("every arming check passes");
-    screen.type_until(b"AARM\r", " ARMED ");
-    screen.type_until(b"SSTART\r", "START  commanded");
-    // A busy machine may leave the radio silent for a second, which holds the countdown: then it is
-    // started again, and armed, if it was not started for long.
-    while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
-        if screen.window().shows(" disarmed PAD_IDLE") {
-            screen.type_until(b"AARM\r", " ARMED ");
-        }
-        screen.type_by_hand(b"SSTART\r");
-        // The words of the first start are still there: only the question whether a person typed is
-        // waited for.
-        screen.confirm_if_prompted("STANDS UNDAMAGED, inside");
-    }
+    screen.arm_and_start(COUNTDOWN, "STANDS UNDAMAGED, inside");
     screen.wait_for("STANDS UNDAMAGED, inside");
     screen.wait_for("STANDS UNDAMAGED; may be approached");
     // The station ends first, so that the vehicle's log confirms all of its book.

@@ -82,15 +82,7 @@ fn a_launch_day_follows_its_page() {
     let mut screen = Terminal::start(&day.command("ground attach"), SIZE, false);
     screen.wait_for("every arming check passes");
     screen.wait_for("crowd line  277 m, fence 120 m");
-    screen.type_until(b"AARM\r", " ARMED ");
-    screen.type_until(b"SSTART\r", "START  commanded");
-    while screen.wait_within(COUNTDOWN, |window| window.shows(" T+").then_some(())).is_none() {
-        if screen.window().shows(" disarmed PAD_IDLE") {
-            screen.type_until(b"AARM\r", " ARMED ");
-        }
-        screen.type_by_hand(b"SSTART\r");
-        screen.confirm_if_prompted("STANDS UNDAMAGED, inside");
-    }
+    screen.arm_and_start(COUNTDOWN, "STANDS UNDAMAGED, inside");
     screen.wait_for("STANDS UNDAMAGED, inside");
     screen.wait_for("may be approached");
     let sent = Running::to_end(&mut day.command("printf"));

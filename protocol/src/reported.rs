@@ -77,17 +77,17 @@ pub struct FlightEvent {
 
 /// The events of a flight, as far as the vehicle's reports have arrived.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct FlightEvents {
+pub struct ReceivedEvents {
     boot_number: u32,
     /// In order of time.
-    pub received: Vec<FlightEvent>,
+    pub events: Vec<FlightEvent>,
 }
 
-impl FlightEvents {
+impl ReceivedEvents {
     /// Takes a report. Events that a restarted flight computer no longer reports remain.
     pub fn take(&mut self, message: &TD_EVENTS_DATA) {
         if message.boot_number != self.boot_number {
-            *self = Self { boot_number: message.boot_number, received: Vec::new() };
+            *self = Self { boot_number: message.boot_number, events: Vec::new() };
         }
         for (place, (at, height)) in message.at.into_iter().zip(message.height).enumerate() {
             let number = TdPhase::TD_PHASE_BOOST as u32 + place as u32;
@@ -95,11 +95,11 @@ impl FlightEvents {
             let Some((phase, name)) = phase.and_then(|phase| Some((phase, event_of(phase)?))) else {
                 continue;
             };
-            self.received.retain(|event| event.phase != phase);
+            self.events.retain(|event| event.phase != phase);
             let (at_s, height_m) = (f64::from(at) / 100.0, f64::from(height) / 10.0);
-            self.received.push(FlightEvent { name, at_s, height_m, phase });
+            self.events.push(FlightEvent { name, at_s, height_m, phase });
         }
-        self.received.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+        self.events.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     }
 }
 
@@ -224,13 +224,13 @@ mod tests {
             (data.at[place], data.height[place]) = (at, 514);
             data
         };
-        let mut events = FlightEvents::default();
-        events.take(&report(1, TdPhase::TD_PHASE_IGNITION, 1_471));
-        events.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 724));
-        let found: Vec<_> = events.received.iter().map(|event| (event.name, event.at_s)).collect();
+        let mut received = ReceivedEvents::default();
+        received.take(&report(1, TdPhase::TD_PHASE_IGNITION, 1_471));
+        received.take(&report(1, TdPhase::TD_PHASE_DEPLOY, 724));
+        let found: Vec<_> = received.events.iter().map(|event| (event.name, event.at_s)).collect();
         assert_eq!(found, [("apogee", 7.24), ("ignition", 14.71)]);
-        events.take(&report(2, TdPhase::TD_PHASE_CHUTE, 900));
-        assert_eq!(events.received.iter().map(|event| event.name).collect::<Vec<_>>(), ["parachute"]);
+        received.take(&report(2, TdPhase::TD_PHASE_CHUTE, 900));
+        assert_eq!(received.events.iter().map(|event| event.name).collect::<Vec<_>>(), ["parachute"]);
     }
 
     /// A roll does not change where the nose points, and both signs of a quaternion are one

@@ -151,6 +151,23 @@ impl Terminal {
         panic!("no `{words}` on:\n{}", self.window().rows().join("\n"));
     }
 
+    /// Arms and starts until the flight begins, and waits for that up to `countdown` each time. A
+    /// busy machine may leave a link silent for a second, which holds the countdown: then it is
+    /// started again, and armed, if it was not started for long. `ending` is shown once it is over.
+    pub fn arm_and_start(&mut self, countdown: Duration, ending: &str) {
+        self.type_until(b"AARM\r", " ARMED ");
+        self.type_until(b"SSTART\r", "START  commanded");
+        while self.wait_within(countdown, |window| window.shows(" T+").then_some(())).is_none() {
+            if self.window().shows(" disarmed PAD_IDLE") {
+                self.type_until(b"AARM\r", " ARMED ");
+            }
+            self.type_by_hand(b"SSTART\r");
+            // The words of the first start are still there: only the question whether a person
+            // typed is waited for.
+            self.confirm_if_prompted(ending);
+        }
+    }
+
     /// Waits until these words are shown, or the question whether a person typed the keys, and
     /// confirms the prompt. Returns whether there was one.
     pub fn confirm_if_prompted(&mut self, words: &str) -> bool {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::dialect::{MavMessage, TdPhase};
-use protocol::reported::FlightEvents;
+use protocol::reported::ReceivedEvents;
 
 use super::quantity::{ALL, COUNT, Quantity};
 use super::{Model, every_second, is_flight, is_on_pad};
@@ -25,7 +25,7 @@ pub struct History {
 /// The events that a vehicle has reported, and its release on the clock of the station.
 #[derive(Debug, Clone, Default)]
 pub struct ReportedEvents {
-    reported: FlightEvents,
+    received: ReceivedEvents,
     /// By the status that took least time to arrive.
     released_at: Option<Duration>,
 }
@@ -33,7 +33,7 @@ pub struct ReportedEvents {
 impl ReportedEvents {
     pub(crate) fn note(&mut self, message: &MavMessage, now: Duration) {
         match message {
-            MavMessage::TD_EVENTS(data) => self.reported.take(data),
+            MavMessage::TD_EVENTS(data) => self.received.take(data),
             MavMessage::TD_FLIGHT_STATUS(status) if status.countdown_ms < 0 => {
                 let since = Duration::from_millis(status.countdown_ms.unsigned_abs().into());
                 self.released_at = self.released_at.into_iter().chain(now.checked_sub(since)).min();
@@ -44,7 +44,7 @@ impl ReportedEvents {
 
     /// Time since the release, s, and height, m, of the event that begins a phase.
     pub fn of(&self, phase: TdPhase) -> Option<(f64, f64)> {
-        let event = self.reported.received.iter().find(|event| event.phase == phase)?;
+        let event = self.received.events.iter().find(|event| event.phase == phase)?;
         Some((event.at_s, event.height_m))
     }
 
@@ -56,7 +56,7 @@ impl ReportedEvents {
 
     /// Dates the phases as the vehicle reports them, not as its messages arrive.
     pub(crate) fn date(&self, timeline: &mut Vec<(TdPhase, Duration)>) {
-        for event in &self.reported.received {
+        for event in &self.received.events {
             let since = Duration::try_from_secs_f64(event.at_s).ok();
             let Some((released_at, since)) = self.released_at.zip(since) else { continue };
             timeline.retain(|(phase, _)| *phase != event.phase);

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use anyhow::Context as _;
 use mavlink::MessageData as _;
-use protocol::dialect::{MavMessage, TD_FLIGHT_STATUS_DATA, TdPhase};
+use protocol::dialect::{GLOBAL_POSITION_INT_DATA, MavMessage, TD_FLIGHT_STATUS_DATA, TdPhase};
 use protocol::field::Field;
 use protocol::frame::{Frame, Framer};
 use protocol::identity::{Address, GROUND, VEHICLE};
@@ -23,7 +23,6 @@ use sim::wire::field::RUN_FACT;
 
 use crate::model::{CommandKind, ReportedEvents, telemetry::phase_of as phase_of_heartbeat};
 use crate::update::Msg;
-use crate::update::frames::GLOBAL_POSITION_ID;
 
 /// A larger step back in time means that the clock was set back, not that frames of two links are
 /// out of order. An MCAP log has none.
@@ -312,7 +311,7 @@ impl LogEvents {
         } else if source.component_id == GROUND.component_id {
             self.ground.get_or_insert(source);
         }
-        let is_tracker = frame.message_id() == GLOBAL_POSITION_ID
+        let is_tracker = frame.message_id() == GLOBAL_POSITION_INT_DATA::ID
             && self.vehicle.is_some_and(|vehicle| vehicle.system_id != source.system_id);
         if Some(source) == self.vehicle || is_tracker {
             return Some(Msg::Frame(frame));

@@ -399,9 +399,9 @@ pub(super) fn step_auto(model: &mut Model, now: Duration) {
 fn start_anew_if_silent(model: &mut Model, now: Duration) {
     let silent = |hold| matches!(hold, TdHold::TD_HOLD_UPLINK_SILENT | TdHold::TD_HOLD_STATION_DEAF);
     let held = model.vehicle.status.as_ref().is_some_and(|status| silent(status.value.hold));
-    let over = |track: &TrackedCommand| track.is_withdrawn || track.disagrees(now);
-    let over = model.commands.of(CommandKind::Start).is_some_and(over);
-    if held && over && model.vehicle.is_armed() && model.link.uplink.is_proven(now) {
+    let start = model.commands.of(CommandKind::Start);
+    let is_over = start.is_some_and(|track| track.is_withdrawn || track.disagrees(now));
+    if held && is_over && model.vehicle.is_armed() && model.link.uplink.is_proven(now) {
         start_auto(model, now);
     }
 }

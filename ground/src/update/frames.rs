@@ -2,8 +2,11 @@
 
 use std::time::Duration;
 
+use mavlink::MessageData as _;
 use protocol::command::CommandAnswer;
-use protocol::dialect::{MavMessage, TD_UPLINK_DATA, TIMESYNC_DATA};
+use protocol::dialect::{
+    GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavMessage, RADIO_STATUS_DATA, TD_UPLINK_DATA, TIMESYNC_DATA,
+};
 use protocol::frame::Frame;
 use protocol::identity::{Address, RADIO};
 use protocol::log::record::EventLevel;
@@ -16,9 +19,6 @@ use crate::model::{
     time_boot_ms,
 };
 
-const HEARTBEAT_ID: u32 = 0;
-const RADIO_STATUS_ID: u32 = 109;
-pub(crate) const GLOBAL_POSITION_ID: u32 = 33;
 /// Maximum age, ms, of a frame by which another station still counts as using our address.
 const SAME_ID_WITHIN_MS: u16 = 5_000;
 /// The vehicle reports a station for 5 s after it has ended. The rest is for the report's latency.
@@ -28,7 +28,7 @@ const STRANGERS_MAX: usize = 8;
 
 pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
     model.link.stats.on_frame(frame, now);
-    if frame.message_id() == RADIO_STATUS_ID {
+    if frame.message_id() == RADIO_STATUS_DATA::ID {
         if frame.source() == RADIO
             && let Ok(MavMessage::RADIO_STATUS(radio)) = frame.decode()
         {
@@ -51,11 +51,11 @@ pub(super) fn on_frame(model: &mut Model, frame: &Frame, now: Duration) {
         if model.commands.sender.on_received(now) {
             commands::poll(model, now);
         }
-    } else if frame.message_id() == GLOBAL_POSITION_ID
+    } else if frame.message_id() == GLOBAL_POSITION_INT_DATA::ID
         && frame.source().system_id != model.settings.vehicle.system_id
     {
         note_tracker(model, frame, now);
-    } else if frame.message_id() == HEARTBEAT_ID {
+    } else if frame.message_id() == HEARTBEAT_DATA::ID {
         note_stranger(model, frame.source(), now);
     }
 }

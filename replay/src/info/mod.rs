@@ -20,7 +20,7 @@ use protocol::dialect::{MavMessage, TD_EVENTS_DATA, TD_FINDING_DATA, TdPhase};
 use protocol::log::record::SCHEMA_VERSION;
 use protocol::log::v1::LimitResult;
 use protocol::program::Exit;
-use protocol::reported::{FlightEvent, FlightEvents};
+use protocol::reported::{FlightEvent, ReceivedEvents};
 use serde::Serialize;
 use time::OffsetDateTime;
 use time::format_description::well_known::Rfc3339;
@@ -130,7 +130,7 @@ struct Seen {
     warned: bool,
     /// The finding that the vehicle has sent last.
     finding: Option<TD_FINDING_DATA>,
-    events: FlightEvents,
+    events: ReceivedEvents,
 }
 
 impl Seen {
@@ -140,7 +140,7 @@ impl Seen {
             // The last verdict is shown: phases and outcome are of the same flight.
             (self.vehicle_phases, self.finding) = (PhaseTracker::default(), None);
             (self.ending, self.flights) = (EndingTracker::default(), flights);
-            self.events = FlightEvents::default();
+            self.events = ReceivedEvents::default();
         }
         self.channels.count(stamped);
         let at_ns = stamped.log_time_ns;
@@ -237,7 +237,7 @@ impl Seen {
             ending: ending.map(after_reset),
             verdict,
             highest_m: self.highest_m.filter(|height_m| height_m.is_finite()),
-            events: self.events.received,
+            events: self.events.events,
             findings,
             not_looked_for: None,
             clocks: log.clocks,
@@ -324,9 +324,9 @@ impl Info {
         if let Some(MavMessage::TD_EVENTS(data)) =
             again.as_ref().ok().and_then(|again| telemetry::events(&again.events, 0))
         {
-            let mut events = FlightEvents::default();
-            events.take(&data);
-            self.events = events.received;
+            let mut received = ReceivedEvents::default();
+            received.take(&data);
+            self.events = received.events;
         }
         self.set_findings(findings::facts(recording, again));
     }

@@ -222,8 +222,8 @@ impl Flights {
 pub(crate) struct Sequences {
     channels: BTreeMap<u16, Numbers>,
     last: Option<u32>,
-    /// The first number of a channel, the smallest of all: writers count from 0 or from 1.
-    first: Option<u32>,
+    /// The smallest number: some writers count from 1.
+    smallest: Option<u32>,
     each_has_its_counter: bool,
     /// Records that are missing, if all share a counter.
     missing: u32,
@@ -244,8 +244,8 @@ impl Sequences {
     /// channel: of it, or of all that share the counter.
     pub(crate) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
         self.each_has_its_counter |= self.last.is_some_and(|last| sequence <= last);
-        self.first = Some(self.first.map_or(sequence, |first| first.min(sequence)));
-        let first = self.from();
+        self.smallest = self.smallest.into_iter().chain([sequence]).min();
+        let first = self.first_number();
         let of_all = self.last.map_or(first, |last| last.saturating_add(1));
         self.missing = self.missing.saturating_add(sequence.saturating_sub(of_all));
         self.last = Some(sequence);
@@ -265,8 +265,8 @@ impl Sequences {
     }
 
     /// The number from which the writer counts.
-    fn from(&self) -> u32 {
-        u32::from(self.first == Some(1))
+    fn first_number(&self) -> u32 {
+        u32::from(self.smallest == Some(1))
     }
 
     /// The number of missing records of a channel that has its counter.
@@ -276,7 +276,7 @@ impl Sequences {
         let numbered = if highest == 0 || self.is_shared() {
             0
         } else {
-            u64::from(highest) + 1 - u64::from(self.from())
+            u64::from(highest) + 1 - u64::from(self.first_number())
         };
         numbered.saturating_sub(records)
     }

@@ -57,12 +57,9 @@ pub(super) fn maps(flight: &Flight) -> String {
     };
     let field = field_lines(flight, fence_m.map_or(FIELD_REACH_M, |fence_m| 2.0 * fence_m));
     let outside: Vec<Line> = fence.into_iter().chain(field).collect();
-    if outside.is_empty() {
-        return picture(COMPLETE, outside).svg();
-    }
-    picture(COMPLETE, outside).svg()
-        + &picture("The same closer, m", Vec::new()).svg()
-        + &field_distances(flight)
+    let closer = || picture("The same closer, m", Vec::new()).svg() + &field_distances(flight);
+    let closer = (!outside.is_empty()).then(closer).unwrap_or_default();
+    picture(COMPLETE, outside).svg() + &closer
 }
 
 /// The field around the pad that the log has.
