@@ -64,8 +64,9 @@ impl<T: Ord, O> Shared<T, O> {
         self.changed.notify_all();
         let idle = |queue: &mut Queue<T, O>| queue.jobs.is_empty() && !queue.ends;
         let mut queue = self.changed.wait_while(queue, idle).unwrap_or_else(PoisonError::into_inner);
-        queue.runs = true;
-        queue.jobs.pop_first().map(|(_, job)| job)
+        let job = queue.jobs.pop_first();
+        queue.runs = job.is_some();
+        job.map(|(_, job)| job)
     }
 }
 
@@ -139,6 +140,8 @@ impl<T, O> Drop for Background<T, O> {
     /// Waits for the last jobs, as long as a disk may stall.
     fn drop(&mut self) {
         self.end();
+        // Nobody reads an outcome any more: the thread must not wait for room for one.
+        self.outcomes = sync_channel(0).1;
         if self.thread.is_some() {
             self.wait(ENDS_WITHIN);
         }
@@ -177,6 +180,15 @@ mod tests {
         assert!(background.wait(ENDS_WITHIN));
         assert_eq!(background.finish().len(), 4);
         assert_eq!(runs.try_iter().collect::<Vec<_>>(), ["wait", "signature", "position"]);
+    }
+
+    #[test]
+    fn nothing_is_waited_for_after_the_last_job() {
+        let mut background = Background::<u32, ()>::start("test").unwrap();
+        background.queue(1, || ());
+        background.end();
+        background.thread.take().unwrap().join().unwrap();
+        assert!(background.wait(Duration::ZERO));
     }
 
     #[test]

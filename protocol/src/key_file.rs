@@ -104,9 +104,7 @@ impl KeyFile {
     /// cannot be parsed.
     pub fn open(path: &Path, user: &str) -> Result<(Self, Signing), KeyFileError> {
         let key = Self::read_key(path)?;
-        let mut stamps_path = path.as_os_str().to_owned();
-        stamps_path.push(format!(".{user}.stamps"));
-        let stamps_path = PathBuf::from(stamps_path);
+        let stamps_path = path.with_added_extension(format!("{user}.stamps"));
         let memory = match fs::read_to_string(&stamps_path) {
             Ok(text) => Memory::from_text(&text)
                 .map_err(|why| KeyFileError::Memory { path: stamps_path.clone(), why })?,
@@ -186,8 +184,7 @@ impl StampFile {
     /// Writes a new file and then renames it, so that it is complete or absent. A file to which
     /// appending failed is replaced as well: its last line may have been cut off.
     fn write_anew(&self, memory: &Memory) -> Result<File, KeyFileError> {
-        let mut beside = self.stamps_path.clone().into_os_string();
-        beside.push(".new");
+        let beside = self.stamps_path.with_added_extension("new");
         let write = || {
             let mut file =
                 OpenOptions::new().write(true).create(true).truncate(true).mode(OWNER_ONLY).open(&beside)?;
