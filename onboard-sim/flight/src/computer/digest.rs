@@ -3,6 +3,7 @@
 //! The hash covers the `serde` serialisation of [`Computer`]. A field that cannot affect the future
 //! (a mission constant, workspace written before it is read, the last input) has `#[serde(skip)]`
 //! and its reason at its declaration. A new field therefore counts unless it is explicitly skipped.
+//! What is written once and then only read may count in the frame that writes it.
 
 use core::hash::Hasher as _;
 
@@ -15,21 +16,35 @@ use super::Computer;
 /// Bytes passed to the hash at once. Word by word, hashing took a third of the time of `replay
 /// verify`.
 const BLOCK: usize = 1024;
+/// Bytes of a number, the longest write into a block.
+const WORD: usize = size_of::<f64>();
 
 /// The running hash, XXH64, as an output of postcard.
 struct Digest {
     hash: XxHash64,
-    /// Bytes not yet hashed: the first `waiting` of the block.
-    block: [u8; BLOCK],
+    /// Bytes not yet hashed: the first `waiting`, always fewer than a block.
+    block: [u8; BLOCK + WORD],
     waiting: usize,
 }
 
 impl Digest {
     fn of(remembered: &impl Serialize) -> u64 {
-        let empty = Self { hash: XxHash64::with_seed(0), block: [0; BLOCK], waiting: 0 };
+        let empty = Self { hash: XxHash64::with_seed(0), block: [0; BLOCK + WORD], waiting: 0 };
         // It cannot fail: this flavour accepts every byte, and every list of the computer has a
         // length.
         postcard::serialize_with_flavor(remembered, empty).unwrap_or_default()
+    }
+
+    /// Appends at most a word.
+    #[inline]
+    fn append<const N: usize>(&mut self, bytes: [u8; N]) {
+        // The remainder changes nothing; it spares a check of the bounds for every number.
+        let at = self.waiting % BLOCK;
+        self.block[at..at + N].copy_from_slice(&bytes);
+        self.waiting = at + N;
+        if self.waiting >= BLOCK {
+            self.flush();
+        }
     }
 
     fn flush(&mut self) {
@@ -43,23 +58,15 @@ impl Flavor for Digest {
 
     #[inline]
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        if self.waiting == BLOCK {
-            self.flush();
-        }
-        self.block[self.waiting] = byte;
-        self.waiting += 1;
+        self.append([byte]);
         Ok(())
     }
 
     #[inline]
     fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        for part in bytes.chunks(BLOCK) {
-            if self.waiting + part.len() > BLOCK {
-                self.flush();
-            }
-            self.block[self.waiting..self.waiting + part.len()].copy_from_slice(part);
-            self.waiting += part.len();
-        }
+        let (words, rest) = bytes.as_chunks::<WORD>();
+        words.iter().for_each(|word| self.append(*word));
+        rest.iter().for_each(|byte| self.append([*byte]));
         Ok(())
     }
 

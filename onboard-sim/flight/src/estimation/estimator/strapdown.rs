@@ -5,7 +5,7 @@
 //! error grows as in Solà 2017, here in world axes.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::covariance::{
     ACCELEROMETER_BIAS, ATTITUDE, BAROMETER_LATE, BAROMETER_OFFSET, BAROMETER_RAM, BAROMETER_SCALE,
@@ -261,15 +261,20 @@ pub(super) struct Since {
     pub(super) acceleration_m_s2: Vector3<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct History {
-    // A slice, because serde supports arrays of up to 32 elements.
-    #[serde(serialize_with = "<[Sums]>::serialize")]
     ring: [Sums; LENGTH],
     filled: usize,
     newest: usize,
     /// Lever arm of the antenna, m, and its velocity, m/s, in the newest frame, world.
     pub(super) lever: [Vector3<f64>; 2],
+}
+
+/// The newest entry alone: the others have not changed since the frames whose digests contain them.
+impl Serialize for History {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (self.ring[self.newest], self.filled, self.newest, self.lever).serialize(serializer)
+    }
 }
 
 impl History {
