@@ -258,10 +258,11 @@ impl Computer {
 
     /// The arming checks with the present values and the best uplink.
     pub fn arming_checks(&self) -> Checks {
-        self.arming_checks_by(self.input.uplink)
+        self.arming_checks_by(self.input.uplink, false)
     }
 
-    pub(super) fn arming_checks_by(&self, uplink: Uplink) -> Checks {
+    /// The arming checks with the uplink of a station; or only those that fail.
+    pub(super) fn arming_checks_by(&self, uplink: Uplink, failing_only: bool) -> Checks {
         let locks = &self.table.mode().interlocks;
         let stance = self.stance();
         let (controller_warm, controller_found, predicted_landing) = match &self.rehearsed {
@@ -292,18 +293,18 @@ impl Computer {
             predicted_landing,
             uplink,
         };
-        arming_checks(&self.arming, &input)
+        arming_checks(&self.arming, &input, failing_only)
     }
 
     /// Evaluates every arming check again. While the vehicle waits, a failure is reported; in the
     /// countdown it holds, until the igniter is energised.
     pub(super) fn repeat_the_checks(&mut self) {
-        let checks = self.arming_checks();
         let armed = match self.table.mode().phase {
             Phase::PadIdle => false,
             Phase::PadArmed => true,
             _ => return,
         };
+        let checks = self.arming_checks_by(self.input.uplink, true);
         let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s) else { return };
         let held = armed && self.hold(HoldCause::CheckFailed, || why);
         if untold && !held {

@@ -90,124 +90,132 @@ pub struct ArmingInput {
 /// The arming checks.
 pub type Checks = ArrayVec<Check, { 16 + SENSORS.len() }>;
 
-/// Every arming check with its value, in the order in which an operator resolves them.
-pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
-    let mib = |bytes: u64| text!("{} MiB", bytes >> 20);
-    let mut checks = Checks::from_iter([
-        Check::condition(
-            "abort latch",
-            !input.abort_latched && input.pad_wait_s.is_none(),
-            "clear",
-            &match input.pad_wait_s.filter(|_| !input.abort_latched) {
-                Some(wait_s) => text!("keep away for {wait_s:.0} s"),
-                None => text!("latched: restart to clear it"),
-            },
-        ),
-        Check::condition("pin", input.pin_out, "out", "in"),
-        Check::condition(
-            "self-test",
-            input.self_test_passed && !input.is_checking,
-            "passed",
-            if input.is_checking { "a check of the vehicle runs" } else { "not passed" },
-        ),
-    ]);
+/// Every arming check with its value, in the order in which an operator resolves them; or only
+/// those that fail, which spares the texts of the others.
+pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput, failing_only: bool) -> Checks {
+    let mut list = List { checks: Checks::new(), failing_only };
+    let approachable = !input.abort_latched && input.pad_wait_s.is_none();
+    list.add("abort latch", approachable, || {
+        let found = match input.pad_wait_s.filter(|_| !input.abort_latched) {
+            _ if approachable => text!("clear"),
+            Some(wait_s) => text!("keep away for {wait_s:.0} s"),
+            None => text!("latched: restart to clear it"),
+        };
+        [found, text!("clear")]
+    });
+    list.condition("pin", input.pin_out, "out", "in");
+    let not_passed = if input.is_checking { "a check of the vehicle runs" } else { "not passed" };
+    list.condition("self-test", input.self_test_passed && !input.is_checking, "passed", not_passed);
     // Before the checks of derived values: the faulty sensor is named, not the value that it
-    // spoils.
-    checks.extend(
-        SENSORS
-            .into_iter()
-            .zip(&input.sensor_defects)
-            .map(|(name, defect)| Check::sensor(name, defect.as_ref())),
-    );
-    checks.extend([
-        Check::at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s"),
-        Check::at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg"),
-        Check::at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s"),
-        Check::condition("estimator", input.estimator_converged, "converged", "not converged"),
-        fins_answering(input),
-        Check::condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit"),
-        Check::condition("log", input.log_running, "running", "not running"),
-        Check {
-            name: "log space",
-            passed: input.log_space_bytes >= limits.log_space_min_bytes,
-            found: mib(input.log_space_bytes),
-            required: text!("at least {}", mib(limits.log_space_min_bytes)),
-        },
-        Check {
-            name: "controller warm",
-            passed: input.controller_warm,
-            found: input.controller_found,
-            required: text!("a rehearsal that lands"),
-        },
-        predicted_landing(input.predicted_landing.as_ref()),
-        uplink(input.uplink),
-        battery(limits, input.battery_v, input.servo_battery_v),
-    ]);
-    if let Some(height_m) = input.hanging_m {
-        checks.push(Check {
-            name: "height below the drone",
-            passed: height_m >= LOWEST_ARMED_M,
-            found: text!("{height_m:.1} m"),
-            required: text!("at least {LOWEST_ARMED_M} m"),
-        });
+    // spoils. The defect contains the sensor's name.
+    for (name, defect) in SENSORS.into_iter().zip(&input.sensor_defects) {
+        list.add(name, defect.is_none(), || [defect.unwrap_or_else(|| text!("speaks")), Text::new()]);
     }
-    checks
+    list.at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s");
+    list.at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg");
+    list.at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s");
+    list.condition("estimator", input.estimator_converged, "converged", "not converged");
+    list.fins_answering(input);
+    list.condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit");
+    list.condition("log", input.log_running, "running", "not running");
+    list.add("log space", input.log_space_bytes >= limits.log_space_min_bytes, || {
+        let mib = |bytes: u64| bytes >> 20;
+        let required = text!("at least {} MiB", mib(limits.log_space_min_bytes));
+        [text!("{} MiB", mib(input.log_space_bytes)), required]
+    });
+    let rehearsed = || [input.controller_found, text!("a rehearsal that lands")];
+    list.add("controller warm", input.controller_warm, rehearsed);
+    let landing = input.predicted_landing.as_ref();
+    list.add("predicted touchdown", landing.is_some_and(|landing| landing.lands), || {
+        let found = landing.map_or_else(|| text!("no prediction"), |landing| landing.found);
+        [found, text!("inside every touchdown limit")]
+    });
+    list.uplink(input.uplink);
+    list.battery(limits, input.battery_v, input.servo_battery_v);
+    if let Some(height_m) = input.hanging_m {
+        let texts = || [text!("{height_m:.1} m"), text!("at least {LOWEST_ARMED_M} m")];
+        list.add("height below the drone", height_m >= LOWEST_ARMED_M, texts);
+    }
+    list.checks
 }
 
 /// The name of the uplink check, the only check that depends on the ground.
 pub const UPLINK_CHECK: &str = "uplink";
 
-fn uplink(uplink: Uplink) -> Check {
-    let (passed, found) = match uplink {
-        Uplink::NotNeeded => (true, text!("not needed: the vehicle starts by itself")),
-        Uplink::NeverReceived => (false, text!("no heartbeat of this station")),
-        Uplink::Received { age_s } => (age_s <= UPLINK_PROVEN_S, text!("heartbeat {age_s:.1} s old")),
-    };
-    Check {
-        name: UPLINK_CHECK,
-        passed,
-        found,
-        required: text!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s"),
+/// A checklist being written.
+struct List {
+    checks: Checks,
+    failing_only: bool,
+}
+
+impl List {
+    /// Adds a check with the text of the value found and of the value required.
+    fn add(&mut self, name: &'static str, passed: bool, texts: impl FnOnce() -> [Text; 2]) {
+        if !(passed && self.failing_only) {
+            let [found, required] = texts();
+            self.checks.push(Check { name, passed, found, required });
+        }
     }
-}
 
-/// Without feedback a servo is assumed to follow its command: then people must have seen it move.
-fn fins_answering(input: &ArmingInput) -> Check {
-    let answering = input.fins_answering.iter().filter(|answers| **answers).count();
-    let (passed, found, required) = match input.seers {
-        None => (answering == input.fins_answering.len(), text!("{answering} of 4"), text!("4 of 4")),
-        Some(seers) => (
-            seers >= SEERS,
-            text!("servos that tell nothing, seen by {seers}"),
-            text!("{SEERS} people who saw a check move them"),
-        ),
-    };
-    Check { name: "fins answering", passed, found, required }
-}
-
-/// The computer's pack, unless the other one alone is too low: that is found on its own limit.
-fn battery(limits: &ArmingLimits, battery_v: Option<f64>, servo_battery_v: Option<f64>) -> Check {
-    let too_low = |volts: &f64| volts.is_nan() || *volts < limits.servo_battery_min_v;
-    if let Some(volts) = servo_battery_v.filter(too_low)
-        && battery_v.is_none_or(|volts| volts >= limits.battery_min_v)
-    {
-        let required = text!("at least {:.1} V", limits.servo_battery_min_v);
-        return Check { name: "battery", passed: false, found: text!("servos {volts:.2} V"), required };
+    /// Adds a check of a yes-or-no condition, with a text for each result.
+    fn condition(&mut self, name: &'static str, passed: bool, yes: &str, no: &str) {
+        self.add(name, passed, || [text!("{}", if passed { yes } else { no }), text!("{yes}")]);
     }
-    let required = text!("at least {:.1} V", limits.battery_min_v);
-    let (passed, found) = match battery_v {
-        None => (true, text!("not measured")),
-        Some(volts) => (volts >= limits.battery_min_v, text!("{volts:.2} V")),
-    };
-    Check { name: "battery", passed, found, required }
-}
 
-fn predicted_landing(predicted: Option<&PredictedLanding>) -> Check {
-    Check {
-        name: "predicted touchdown",
-        passed: predicted.is_some_and(|landing| landing.lands),
-        found: predicted.map_or_else(|| text!("no prediction"), |landing| landing.found),
-        required: text!("inside every touchdown limit"),
+    /// Adds a check of a magnitude against a limit. NaN fails.
+    fn at_most(&mut self, name: &'static str, value: f64, limit: f64, unit: &str) {
+        self.add(name, value.abs() <= limit, || {
+            let found = if value.is_nan() { text!("not known") } else { text!("{:.2} {unit}", value.abs()) };
+            [found, text!("at most {limit} {unit}")]
+        });
+    }
+
+    fn uplink(&mut self, uplink: Uplink) {
+        let passed = match uplink {
+            Uplink::NotNeeded => true,
+            Uplink::NeverReceived => false,
+            Uplink::Received { age_s } => age_s <= UPLINK_PROVEN_S,
+        };
+        self.add(UPLINK_CHECK, passed, || {
+            let found = match uplink {
+                Uplink::NotNeeded => text!("not needed: the vehicle starts by itself"),
+                Uplink::NeverReceived => text!("no heartbeat of this station"),
+                Uplink::Received { age_s } => text!("heartbeat {age_s:.1} s old"),
+            };
+            [found, text!("a heartbeat of the asking station in the last {UPLINK_PROVEN_S} s")]
+        });
+    }
+
+    /// Without feedback a servo is assumed to follow its command: then people must have seen it
+    /// move.
+    fn fins_answering(&mut self, input: &ArmingInput) {
+        let answering = input.fins_answering.iter().filter(|answers| **answers).count();
+        let all = input.fins_answering.len();
+        self.add("fins answering", input.seers.map_or(answering == all, |seers| seers >= SEERS), || {
+            match input.seers {
+                None => [text!("{answering} of 4"), text!("4 of 4")],
+                Some(seers) => [
+                    text!("servos that tell nothing, seen by {seers}"),
+                    text!("{SEERS} people who saw a check move them"),
+                ],
+            }
+        });
+    }
+
+    /// The computer's pack, unless the other one alone is too low: that is found on its own limit.
+    fn battery(&mut self, limits: &ArmingLimits, battery_v: Option<f64>, servo_battery_v: Option<f64>) {
+        let passed = battery_v.is_none_or(|volts| volts >= limits.battery_min_v);
+        let too_low = |volts: &f64| volts.is_nan() || *volts < limits.servo_battery_min_v;
+        let servos_v = servo_battery_v.filter(|volts| passed && too_low(volts));
+        self.add("battery", passed && servos_v.is_none(), || match (servos_v, battery_v) {
+            (Some(volts), _) => {
+                [text!("servos {volts:.2} V"), text!("at least {:.1} V", limits.servo_battery_min_v)]
+            }
+            (None, battery_v) => {
+                let found = battery_v.map_or_else(|| text!("not measured"), |volts| text!("{volts:.2} V"));
+                [found, text!("at least {:.1} V", limits.battery_min_v)]
+            }
+        });
     }
 }
 
@@ -227,28 +235,6 @@ pub struct Check {
 }
 
 impl Check {
-    /// A check of a yes-or-no condition, with a text for each result.
-    pub(crate) fn condition(name: &'static str, passed: bool, yes: &str, no: &str) -> Self {
-        let found = if passed { yes } else { no };
-        Self { name, passed, found: text!("{found}"), required: text!("{yes}") }
-    }
-
-    /// A check of a magnitude against a limit. NaN fails.
-    pub(crate) fn at_most(name: &'static str, value: f64, limit: f64, unit: &str) -> Self {
-        Self {
-            name,
-            passed: value.abs() <= limit,
-            found: if value.is_nan() { text!("not known") } else { text!("{:.2} {unit}", value.abs()) },
-            required: text!("at most {limit} {unit}"),
-        }
-    }
-
-    /// A check of a sensor; the defect contains the sensor's name.
-    fn sensor(name: &'static str, defect: Option<&Text>) -> Self {
-        let found = defect.copied().unwrap_or_else(|| text!("speaks"));
-        Self { name, passed: defect.is_none(), found, required: Text::new() }
-    }
-
     /// The refusal as text, or `None` if passed.
     pub fn refusal(&self) -> Option<Text> {
         let Self { name, found, required, .. } = self;
@@ -271,6 +257,8 @@ pub fn first_refusal(checks: &[Check]) -> Option<Text> {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec::Vec;
+
     use super::*;
 
     fn ready() -> ArmingInput {
@@ -302,12 +290,12 @@ mod tests {
 
     #[test]
     fn a_ready_vehicle_passes_every_check() {
-        let checks = arming_checks(&ArmingLimits::default(), &ready());
+        let checks = arming_checks(&ArmingLimits::default(), &ready(), false);
         assert!(all_passed(&checks));
         assert_eq!(first_refusal(&checks), None);
         // Without a crew no station is needed.
         let alone = ArmingInput { uplink: Uplink::NotNeeded, ..ready() };
-        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone)));
+        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone, false)));
     }
 
     /// A faulty input, and the check that must refuse it.
@@ -398,8 +386,10 @@ mod tests {
         for (expected, spoil) in spoilings {
             let mut input = ready();
             spoil(&mut input);
-            let checks = arming_checks(&ArmingLimits::default(), &input);
-            assert_eq!(checks.iter().filter(|check| !check.passed).count(), 1, "{expected}");
+            let checks = arming_checks(&ArmingLimits::default(), &input, false);
+            let failing: Vec<_> = checks.iter().filter(|check| !check.passed).cloned().collect();
+            assert_eq!(failing.len(), 1, "{expected}");
+            assert_eq!(arming_checks(&ArmingLimits::default(), &input, true)[..], failing);
             let refusal = first_refusal(&checks).unwrap();
             assert!(refusal.starts_with(expected), "{refusal}");
         }
