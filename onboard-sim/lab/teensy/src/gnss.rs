@@ -1,14 +1,17 @@
 //! u-blox M10 over a UART (interface description UBX-21035062): the message UBX-NAV-PVT, and the
 //! setting for more than 1 g, which is read back.
 //!
-//! Messages and keys were compared with the crate `ublox` 0.10, which a test still does.
+//! Compared with u-blox' public library `ubxlib`: messages with
+//! `gnss/api/u_gnss_dec_ubx_nav_pvt.h`, keys and layers with `gnss/src/u_gnss_cfg.c`
+//! (`valSetByte`, `valGetByte`) and `gnss/api/u_gnss_cfg_val_key.h`, the model with
+//! `gnss/api/u_gnss_type.h`.
 
 use embedded_io::Write;
 use flight::estimation::estimator::FixQuality;
 
 /// UBX-CFG-VALSET of one key, in RAM alone: a reset of the receiver forgets it, so it is sent until
-/// it is read back. CFG-NAVSPG-DYNMODEL = 8: airborne, below 4 g. The default model rejects the
-/// motion of a rocket.
+/// it is read back. CFG-NAVSPG-DYNMODEL (0x20110021) = 8 (U_GNSS_DYNAMIC_AIRBORNE_4G). The default
+/// model rejects the motion of a rocket.
 const SET_AIRBORNE: [u8; 9] = [0, 0x01, 0, 0, 0x21, 0x00, 0x11, 0x20, 8];
 /// UBX-CFG-VALGET of that key from RAM.
 const GET_MODEL: [u8; 8] = [0, 0, 0, 0, 0x21, 0x00, 0x11, 0x20];
