@@ -8,7 +8,6 @@
 
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
-use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -246,6 +245,7 @@ fn frames_as_interrupts_survive_a_storm_of_allocations() {
     }
     let ended = chip.wait();
     assert_eq!(ended.code, Some(0), "{}", ended.output);
+    eprintln!("{}", ended.output);
     let mut reader = Reader::default();
     reader.push(&fs::read(folder.path().join("answers")).unwrap());
     let answers: Vec<Answer> = std::iter::from_fn(|| reader.next_record()).collect();
@@ -255,11 +255,8 @@ fn frames_as_interrupts_survive_a_storm_of_allocations() {
         let line = ended.output.lines().find(|line| line.contains(words)).unwrap();
         line.split(' ').filter_map(|word| word.parse().ok()).collect()
     };
-    let ([flown, waited, latest], [allocations]) =
-        (numbers("as interrupts")[..], numbers("allocations of")[..])
-    else {
-        panic!("{}", ended.output)
-    };
+    let found = [numbers("as interrupts"), numbers("allocations of")].concat();
+    let [flown, waited, latest, allocations] = found[..] else { panic!("{}", ended.output) };
     assert_eq!(flown, recorded.len() as u64);
     assert!(allocations > 100 * flown && waited > flown / 10, "no storm: {}", ended.output);
     assert!(latest <= LATEST_INSTRUCTIONS, "{}", ended.output);

@@ -59,15 +59,18 @@ pub(crate) struct Fix {
     pub(crate) quality: FixQuality,
 }
 
-/// The fix of a frame, if its checksum is right and the receiver vouches for it.
+/// The fix of a frame, if its checksum is right and the receiver vouches for it: `gnssFixOK` in
+/// `flags`, and not `invalidLlh` in `flags3`.
 pub(crate) fn fix(frame: &[u8; FRAME_BYTES]) -> Option<Fix> {
     let payload = &frame[6..98];
-    if checksum(&frame[2..98]) != frame[98..] || !IN_SPACE.contains(&payload[20]) || payload[21] & 1 == 0 {
+    let vouched = IN_SPACE.contains(&payload[20]) && payload[21] & 1 == 1 && payload[78] & 1 == 0;
+    if checksum(&frame[2..98]) != frame[98..] || !vouched {
         return None;
     }
-    let number = |at: usize| {
-        f64::from(i32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]))
-    };
+    let bytes = |at: usize| [payload[at], payload[at + 1], payload[at + 2], payload[at + 3]];
+    let number = |at: usize| f64::from(i32::from_le_bytes(bytes(at)));
+    // The largest number if unknown.
+    let accuracy = |at: usize| f64::from(u32::from_le_bytes(bytes(at))) * 1e-3;
     Some(Fix {
         longitude_deg: number(24) * 1e-7,
         latitude_deg: number(28) * 1e-7,
@@ -75,9 +78,9 @@ pub(crate) fn fix(frame: &[u8; FRAME_BYTES]) -> Option<Fix> {
         velocity_ned_m_s: [48, 52, 56].map(|at| number(at) * 1e-3),
         quality: FixQuality {
             satellites: u32::from(payload[23]),
-            horizontal_m: number(40) * 1e-3,
-            vertical_m: number(44) * 1e-3,
-            speed_m_s: number(68) * 1e-3,
+            horizontal_m: accuracy(40),
+            vertical_m: accuracy(44),
+            speed_m_s: accuracy(68),
         },
     })
 }
