@@ -172,6 +172,7 @@ impl Chain {
         drop(board);
         let ended = chip.wait();
         assert_eq!(ended.code, Some(0), "{}", ended.output);
+        eprintln!("{}", ended.output);
         ended.output
     }
 }
