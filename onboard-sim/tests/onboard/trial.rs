@@ -11,7 +11,7 @@ pub(crate) const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/mk3_trials.c
 pub(crate) struct Trial {
     pub(crate) table: String,
     pub(crate) row: String,
-    /// A line of the mission, or lines behind it.
+    /// Lines of the mission or of the dispersions, with a semicolon between two changes.
     change: String,
     fault: String,
     start: String,
@@ -22,6 +22,8 @@ pub(crate) struct Trial {
     pub(crate) stands: u64,
     /// Those of them that touched down inside the design envelope of the legs.
     pub(crate) envelope: u64,
+    /// Those inside the landing paper's Table 2; `None` in rows that were flown before it counted.
+    pub(crate) table_2: Option<u64>,
     /// Vertical speed at the contact of flight 0, m/s.
     pub(crate) first_m_s: String,
 }
@@ -35,13 +37,26 @@ impl Trial {
     /// What flies.
     pub(crate) fn recipe(&self) -> anyhow::Result<Recipe> {
         let recipe = Recipe::built_in("mk3", &self.dispersion)?.starting_at(self.start.parse()?)?;
-        let key = self.change.split('=').next().unwrap_or_default();
-        let line = recipe.mission_toml.lines().find(|line| !key.is_empty() && line.starts_with(key));
-        let mission_toml = match line {
-            Some(line) => recipe.mission_toml.replace(line, &self.change),
-            None => format!("{}\n{}", recipe.mission_toml, self.change),
-        };
+        let (mut mission, mut dispersion) = (recipe.mission_toml.clone(), recipe.dispersion_toml.clone());
+        for change in self.change.split(';').map(str::trim).filter(|change| !change.is_empty()) {
+            let changed = [&mut mission, &mut dispersion].into_iter().find_map(|toml| {
+                let with = replaced(toml, change)?;
+                *toml = with;
+                Some(())
+            });
+            if changed.is_none() {
+                mission = format!("{mission}\n{change}");
+            }
+        }
         let faults = self.fault.split_whitespace().map(str::parse).collect::<Result<Vec<_>, _>>()?;
-        Ok(Recipe { faults, seed: self.seed, ..recipe.with_mission(mission_toml)? })
+        let texts = (recipe.mission.name.as_str(), mission.as_str());
+        let recipe = Recipe::from_texts(texts, (&self.dispersion, &dispersion))?;
+        Ok(Recipe { faults, seed: self.seed, ..recipe })
     }
+}
+
+/// A text whose line with the key of a change is the change; `None` if it has no such line.
+fn replaced(toml: &str, change: &str) -> Option<String> {
+    let key = change.split(['=', '\n']).next()?;
+    toml.lines().find(|line| line.starts_with(key)).map(|line| toml.replacen(line, change, 1))
 }

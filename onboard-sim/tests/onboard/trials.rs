@@ -45,6 +45,19 @@ fn the_tables_of_the_page_are_the_measured_ones() {
             assert_eq!([found[0], found[found.len() - 1]], [pair.0, pair.1], "{table}");
         }
     }
+    let counts = |trial: &Trial| -> Vec<u64> {
+        [Some(trial.stands), Some(trial.envelope), trial.table_2].into_iter().flatten().collect()
+    };
+    for trial in trials.iter().filter(|trial| trial.table == "change") {
+        assert_eq!(row("\n## Trials\n", &format!("{} |", trial.row)), counts(trial), "{}", trial.row);
+    }
+    for first in ["as built", "softer"] {
+        let of_plan = trials.iter().filter(|trial| trial.table == "plan" && trial.row.starts_with(first));
+        assert_eq!(row("\n### A softer plan\n", first), of_plan.flat_map(counts).collect::<Vec<_>>());
+    }
+    let late = trials.iter().find(|trial| trial.row.starts_with("igniters")).unwrap();
+    let sentence = format!("Igniters that all need 0.4 s land\n  {} of {}.", late.stands, late.flights);
+    assert!(include_str!("../../../docs/build-mk3.md").contains(&sentence), "{sentence}");
 }
 
 #[test]

@@ -150,7 +150,7 @@ impl Computer {
                 // Counted in frames, so that T+ has the same bits with and without a pad.
                 let frame = libm::round(time_s / FRAME_S) as u64;
                 let since_s = flight_time_s(frame.saturating_sub(flown.release.frame));
-                *self.pilot = self.pilot.resumed(&flown.pilot, since_s);
+                self.pilot.resume(&flown.pilot, since_s);
             }
             None => self.wake_on_the_pad(saved, time_s),
         }

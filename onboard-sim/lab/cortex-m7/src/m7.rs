@@ -1,8 +1,8 @@
 //! The only program of a Cortex-M7. Its link is semihosting: the files `frames`, `answers` and
-//! `costs` in the folder of the emulator or debugger. Its radio is the serial device `radio` there,
-//! if a flight has a crew. The files `saved-0` and `saved-1` are its memory that survives a reset:
-//! where a recorded flight's computer was dead, this program resets its processor and continues
-//! from them.
+//! `costs` in the folder of the emulator or debugger. Its radio is the files `uplink` and
+//! `downlink` there, if a flight has a crew. The files `saved-0` and `saved-1` are its memory that
+//! survives a reset: where a recorded flight's computer was dead, this program resets its processor
+//! and continues from them.
 
 use core::ffi::CStr;
 use core::fmt::Write as _;
@@ -134,30 +134,30 @@ fn fly(
     }
 }
 
-/// The serial device `radio`: a pseudo-terminal that returns the bytes it has without waiting
-/// (`stty min 0 time 0`).
+/// The radio: the files `uplink` and `downlink`, opened with the first byte requested; `Some(None)`
+/// without a radio. Reading must not wait: regular files return what they have, and so does a
+/// pseudo-terminal under two names (`stty min 0 time 0`).
 #[derive(Default)]
 struct Serial {
-    /// Opened at the first byte requested; `Some(None)` if it does not exist.
-    device: Option<Option<File>>,
+    files: Option<Option<(File, File)>>,
 }
 
 impl Serial {
-    fn device(&mut self) -> Option<&mut File> {
-        let open = || File::options().read(true).write(true).open(c"radio").ok();
-        self.device.get_or_insert_with(open).as_mut()
+    fn files(&mut self) -> Option<&mut (File, File)> {
+        let open = || Some((File::open(c"uplink").ok()?, File::create(c"downlink").ok()?));
+        self.files.get_or_insert_with(open).as_mut()
     }
 }
 
 impl Radio for Serial {
     fn read(&mut self, into: &mut [u8]) -> usize {
-        self.device().and_then(|device| device.read(into).ok()).unwrap_or(0)
+        self.files().and_then(|(uplink, _)| uplink.read(into).ok()).unwrap_or(0)
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        if let Some(device) = self.device() {
+        if let Some((_, downlink)) = self.files() {
             // Bytes without room are dropped.
-            let _ = device.write_all(bytes);
+            let _ = downlink.write_all(bytes);
         }
     }
 }

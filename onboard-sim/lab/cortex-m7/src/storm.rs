@@ -19,9 +19,12 @@ use semihosting::println;
 
 use crate::m7::{HEAP, INSTRUCTIONS_PER_COUNT};
 
-/// Counts of the timer between two ticks, 10 us of the emulated time, and ticks in a frame.
+/// Counts of the timer between two ticks, 10 us of the emulated time, and ticks in a frame: a tenth
+/// of a real frame's, because the main context does nothing but allocate.
 const TICK_COUNTS: u32 = 250;
-const FRAME_TICKS: u32 = 500;
+const FRAME_TICKS: u32 = 50;
+/// Frames between reports of the progress.
+const REPORTED_FRAMES: u64 = 250;
 /// Blocks that the main context holds, and the longest, bytes.
 const BLOCKS: usize = 64;
 const LONGEST_BYTES: usize = 4096;
@@ -51,11 +54,16 @@ pub(crate) fn tick() {
         flying.late += u64::from(late_ticks > 0);
         flying.latest_ticks = flying.latest_ticks.max(late_ticks);
         flying.ticks = 0;
-        if !matches!(flying.fly(), Ok(true)) {
+        let goes_on = matches!(flying.fly(), Ok(true));
+        if goes_on && flying.board.frames().is_multiple_of(REPORTED_FRAMES) {
+            println!("{} frames so far", flying.board.frames());
+        }
+        if !goes_on {
             let Frames { board, late, latest_ticks, .. } = &*flying;
             let instructions = u64::from(latest_ticks * TICK_COUNTS) * INSTRUCTIONS_PER_COUNT;
             println!(
-                "{} frames as interrupts; {late} found the heap in use, the latest started {instructions} instructions late",
+                "{} frames as interrupts; {late} found the heap in use, the latest started {instructions} \
+                 instructions late",
                 board.frames()
             );
             OVER.store(true, Ordering::Relaxed);

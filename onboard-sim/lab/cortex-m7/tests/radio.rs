@@ -1,6 +1,6 @@
 //! The program of a board, as a process: it exchanges MAVLink with the ordinary ground station over
 //! a serial radio, and decides every frame of a simulated world, which is another process.
-//! `benches/chain.rs` does the same with the image of a Cortex-M7.
+//! `tests/emulated.rs` does the same with the image of a Cortex-M7.
 #![expect(clippy::unwrap_used, reason = "a test that cannot set itself up has failed")]
 
 use std::fs::File;

@@ -1,17 +1,18 @@
 //! BMP390 over I2C (Bosch, BST-BMP390-DS002): a pressure and a temperature every 20 ms, without
 //! waiting for any.
 //!
-//! The registers were compared with the crate `bmp390` 0.5.0-alpha.1 (`device.yaml`), not with the
-//! data sheet itself: its sections are named from memory.
+//! Registers, bits, times and formulas were compared with Bosch's public driver BMP3_SensorAPI,
+//! version of 2022-07-12: `bmp3_defs.h`, whose names are given here, and `bmp3.c`.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::i2c::I2c;
 
 use crate::Trouble;
 
-/// Address with the pin SDO high.
+/// Address with the pin SDO high: BMP3_ADDR_I2C_SEC.
 const ADDRESS: u8 = 0x77;
-/// Registers (section 4.3), with [`NAME`] in the first.
+/// Registers: BMP3_REG_CHIP_ID (with BMP390_CHIP_ID in it), SENS_STATUS, PWR_CTRL, OSR, ODR,
+/// CONFIG, CALIB_DATA and CMD (which takes BMP3_SOFT_RESET). The samples follow the status.
 const CHIP_ID: u8 = 0x00;
 const STATUS: u8 = 0x03;
 const PWR_CTRL: u8 = 0x1B;
@@ -22,11 +23,15 @@ const COEFFICIENTS: u8 = 0x31;
 const CMD: u8 = 0x7E;
 const NAME: u8 = 0x60;
 const SOFT_RESET: u8 = 0xB6;
-/// Both sensors are measured without an end; 8 pressures and 1 temperature make a sample, which
-/// takes 19 ms (section 3.9.2); 50 samples a second; no filter, which would delay them.
+/// Both sensors (BMP3_PRESS_EN and TEMP_EN) are measured without an end (BMP3_MODE_NORMAL, bits
+/// 5:4); 8 pressures (BMP3_OVERSAMPLING_8X) and 1 temperature make a sample, which takes 18.9 ms:
+/// 234 us, 392 us and 8 times 2 ms, 313 us and 2 ms (`bmp3.c`, `validate_osr_and_odr_settings`); 50
+/// samples a second (BMP3_ODR_50_HZ); no filter (bits 3:1), which would delay them.
 const SETTINGS: [[u8; 2]; 4] = [[OSR, 0x03], [ODR, 0x02], [CONFIG, 0x00], [PWR_CTRL, 0x33]];
-/// In [`STATUS`]: new pressure and new temperature.
+/// In [`STATUS`]: BMP3_DRDY_PRESS and BMP3_DRDY_TEMP.
 const READY: u8 = 0x60;
+/// Time of a soft reset, five times that of `bmp3_soft_reset`.
+const RESET_MS: u32 = 10;
 const SILENT: Trouble = Trouble::Part("the barometer does not answer on its bus");
 
 /// A barometer.
@@ -37,7 +42,8 @@ pub struct Barometer {
     pub temperature_c: Option<f64>,
 }
 
-/// Coefficients of a sensor: of the temperature, and of the pressure (section 8.4).
+/// Coefficients of a sensor: of the temperature, and of the pressure, as floating-point
+/// numbers (`bmp3.c`, `parse_calib_data`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coefficients {
     t: [f64; 3],
@@ -49,7 +55,7 @@ impl Barometer {
     pub(crate) fn start(bus: &mut impl I2c, delay: &mut impl DelayNs) -> Result<Self, Trouble> {
         let (mut name, mut bytes) = ([0], [0; 21]);
         bus.write(ADDRESS, &[CMD, SOFT_RESET]).map_err(|_bus| SILENT)?;
-        delay.delay_ms(10);
+        delay.delay_ms(RESET_MS);
         bus.write_read(ADDRESS, &[CHIP_ID], &mut name).map_err(|_bus| SILENT)?;
         if name != [NAME] {
             return Err(Trouble::AnotherBarometer(name[0]));
@@ -77,7 +83,7 @@ impl Barometer {
 }
 
 impl Coefficients {
-    /// Those of the registers from 0x31 on (section 3.11.1).
+    /// Those of the registers from BMP3_REG_CALIB_DATA on, BMP3_LEN_CALIB_DATA bytes.
     pub(crate) fn of(bytes: &[u8; 21]) -> Self {
         let unsigned = |at: usize| f64::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
         let signed = |at: usize| f64::from(i16::from_le_bytes([bytes[at], bytes[at + 1]]));
@@ -101,7 +107,8 @@ impl Coefficients {
         }
     }
 
-    /// Temperature, degrees Celsius, and pressure, Pa (sections 8.5 and 8.6).
+    /// Temperature, degrees Celsius, and pressure, Pa (`bmp3.c`, `compensate_temperature` and
+    /// `compensate_pressure`).
     pub(crate) fn compensated(&self, pressure_raw: u32, temperature_raw: u32) -> (f64, f64) {
         let Self { t: [t1, t2, t3], p: [p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11] } = *self;
         let (raw, above) = (f64::from(pressure_raw), f64::from(temperature_raw) - t1);

@@ -1,14 +1,17 @@
 //! u-blox M10 over a UART (interface description UBX-21035062): the message UBX-NAV-PVT, and the
 //! setting for more than 1 g, which is read back.
 //!
-//! Messages and keys were compared with the crate `ublox` 0.10, which a test still does.
+//! Compared with u-blox' public library `ubxlib`: messages with
+//! `gnss/api/u_gnss_dec_ubx_nav_pvt.h`, keys and layers with `gnss/src/u_gnss_cfg.c`
+//! (`valSetByte`, `valGetByte`) and `gnss/api/u_gnss_cfg_val_key.h`, the model with
+//! `gnss/api/u_gnss_type.h`.
 
 use embedded_io::Write;
 use flight::estimation::estimator::FixQuality;
 
 /// UBX-CFG-VALSET of one key, in RAM alone: a reset of the receiver forgets it, so it is sent until
-/// it is read back. CFG-NAVSPG-DYNMODEL = 8: airborne, below 4 g. The default model rejects the
-/// motion of a rocket.
+/// it is read back. CFG-NAVSPG-DYNMODEL (0x20110021) = 8 (U_GNSS_DYNAMIC_AIRBORNE_4G). The default
+/// model rejects the motion of a rocket.
 const SET_AIRBORNE: [u8; 9] = [0, 0x01, 0, 0, 0x21, 0x00, 0x11, 0x20, 8];
 /// UBX-CFG-VALGET of that key from RAM.
 const GET_MODEL: [u8; 8] = [0, 0, 0, 0, 0x21, 0x00, 0x11, 0x20];
@@ -56,15 +59,18 @@ pub(crate) struct Fix {
     pub(crate) quality: FixQuality,
 }
 
-/// The fix of a frame, if its checksum is right and the receiver vouches for it.
+/// The fix of a frame, if its checksum is right and the receiver vouches for it: `gnssFixOK` in
+/// `flags`, and not `invalidLlh` in `flags3`.
 pub(crate) fn fix(frame: &[u8; FRAME_BYTES]) -> Option<Fix> {
     let payload = &frame[6..98];
-    if checksum(&frame[2..98]) != frame[98..] || !IN_SPACE.contains(&payload[20]) || payload[21] & 1 == 0 {
+    let vouched = IN_SPACE.contains(&payload[20]) && payload[21] & 1 == 1 && payload[78] & 1 == 0;
+    if checksum(&frame[2..98]) != frame[98..] || !vouched {
         return None;
     }
-    let number = |at: usize| {
-        f64::from(i32::from_le_bytes([payload[at], payload[at + 1], payload[at + 2], payload[at + 3]]))
-    };
+    let bytes = |at: usize| [payload[at], payload[at + 1], payload[at + 2], payload[at + 3]];
+    let number = |at: usize| f64::from(i32::from_le_bytes(bytes(at)));
+    // The largest number if unknown.
+    let accuracy = |at: usize| f64::from(u32::from_le_bytes(bytes(at))) * 1e-3;
     Some(Fix {
         longitude_deg: number(24) * 1e-7,
         latitude_deg: number(28) * 1e-7,
@@ -72,9 +78,9 @@ pub(crate) fn fix(frame: &[u8; FRAME_BYTES]) -> Option<Fix> {
         velocity_ned_m_s: [48, 52, 56].map(|at| number(at) * 1e-3),
         quality: FixQuality {
             satellites: u32::from(payload[23]),
-            horizontal_m: number(40) * 1e-3,
-            vertical_m: number(44) * 1e-3,
-            speed_m_s: number(68) * 1e-3,
+            horizontal_m: accuracy(40),
+            vertical_m: accuracy(44),
+            speed_m_s: accuracy(68),
         },
     })
 }

@@ -1,8 +1,10 @@
-//! TF-Luna over a UART (Benewake, SJ-PM-TF-Luna): frames of nine bytes, 100 a second.
+//! TF-Luna over a UART (Benewake, SJ-PM-TF-Luna A05, appendix I, "9-byte/cm (Default)"): head,
+//! distance, strength, temperature, sum of all; low bytes first, 100 a second (section 5.5).
 
 pub(crate) const FRAME_BYTES: usize = 9;
 pub(crate) const HEAD: &[u8] = &[0x59, 0x59];
-/// Strength of an echo that its maker vouches for.
+/// Strength of an echo that its maker vouches for: the distance is unreliable below 100, and at
+/// 65,535, which is overexposed (the same).
 const STRONG: core::ops::Range<u16> = 100..0xFFFF;
 
 /// The range of a frame, m, if its checksum is right and its echo was strong enough.

@@ -347,7 +347,9 @@ mod tests {
     fn an_abort_in_the_first_frame_has_the_height() {
         let pilot = sample::falling();
         assert!(abort_releases(&mut pilot.clone(), 1));
-        assert!(abort_releases(&mut sample::falling().resumed(&pilot.saved(), 0.1), 21));
+        let mut resumed = sample::falling();
+        resumed.resume(&pilot.saved(), 0.1);
+        assert!(abort_releases(&mut resumed, 21));
     }
 
     fn falling(time_s: f64) -> Estimate {

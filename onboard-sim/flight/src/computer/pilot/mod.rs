@@ -263,52 +263,42 @@ impl Pilot {
         }
     }
 
-    /// This newly powered-up pilot with the state saved before a reset that ended at `time_s`. The
+    /// Gives this newly powered-up pilot the state saved before a reset that ended at `time_s`. The
     /// saved estimate is extrapolated over the lost time with the last measured rates and forces,
-    /// and gets the same uncertainty as at apogee.
-    #[must_use]
-    pub(super) fn resumed(&self, saved: &SavedPilot, time_s: f64) -> Self {
-        let mission = &self.model.mission;
-        let uncertainty = StartUncertainty::at_apogee();
-        let estimator = saved.estimate.map_or_else(
-            || self.estimator.clone(),
-            |estimate| {
-                let lost_s = (time_s - estimate.time_s).max(0.0);
-                let mut initial = estimate.state;
-                // The rotation rate is held constant; the force has its direction at half of the
-                // lost time.
-                let half = nalgebra::UnitQuaternion::from_scaled_axis(initial.rate_rad_s * (0.5 * lost_s));
-                initial.world_from_body *= half;
-                let force = initial.world_from_body * estimate.specific_force_m_s2;
-                initial.world_from_body *= half;
-                let acceleration_m_s2 = force - nalgebra::Vector3::z() * STANDARD_GRAVITY_M_S2;
-                initial.position_m +=
-                    initial.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
-                initial.velocity_m_s += acceleration_m_s2 * lost_s;
-                let estimator = Estimator::new(&mission.estimator, &uncertainty, time_s, &initial);
-                let calibration = ImuCalibration {
-                    gyro_bias_rad_s: estimate.gyro_bias_rad_s,
-                    accelerometer_scale: saved.accelerometer_scale,
-                };
-                Box::new(estimator.calibrated(&calibration))
-            },
-        );
-        let mut resumed = Self {
-            estimator,
-            estimate: saved.estimate,
-            speeds: saved.speeds.resumed(),
-            ascent: saved.ascent,
-            apogee_m: saved.apogee_m,
-            ignited_at_s: saved.ignited_at_s,
-            fin_share: saved.fin_share,
-            fins_rad: saved.fins_rad,
-            fin_watch: saved.fin_watch,
-            swing_watch: saved.swing_watch.interrupted(),
-            gimbal_rad: saved.gimbal_rad,
-            ..self.clone()
-        };
-        resumed.model.motor = saved.motor;
-        resumed
+    /// and gets the same uncertainty as at apogee. The buffers of the plans remain, so that no frame
+    /// allocates them.
+    pub(super) fn resume(&mut self, saved: &SavedPilot, time_s: f64) {
+        if let Some(estimate) = saved.estimate {
+            let lost_s = (time_s - estimate.time_s).max(0.0);
+            let mut initial = estimate.state;
+            // The rotation rate is held constant; the force has its direction at half of the lost
+            // time.
+            let half = nalgebra::UnitQuaternion::from_scaled_axis(initial.rate_rad_s * (0.5 * lost_s));
+            initial.world_from_body *= half;
+            let force = initial.world_from_body * estimate.specific_force_m_s2;
+            initial.world_from_body *= half;
+            let acceleration_m_s2 = force - nalgebra::Vector3::z() * STANDARD_GRAVITY_M_S2;
+            initial.position_m += initial.velocity_m_s * lost_s + acceleration_m_s2 * (0.5 * lost_s * lost_s);
+            initial.velocity_m_s += acceleration_m_s2 * lost_s;
+            let (settings, uncertainty) = (&self.model.mission.estimator, StartUncertainty::at_apogee());
+            let estimator = Estimator::new(settings, &uncertainty, time_s, &initial);
+            let calibration = ImuCalibration {
+                gyro_bias_rad_s: estimate.gyro_bias_rad_s,
+                accelerometer_scale: saved.accelerometer_scale,
+            };
+            *self.estimator = estimator.calibrated(&calibration);
+        }
+        self.estimate = saved.estimate;
+        self.speeds = saved.speeds.resumed();
+        self.ascent = saved.ascent;
+        self.apogee_m = saved.apogee_m;
+        self.ignited_at_s = saved.ignited_at_s;
+        self.fin_share = saved.fin_share;
+        self.fins_rad = saved.fins_rad;
+        self.fin_watch = saved.fin_watch;
+        self.swing_watch = saved.swing_watch.interrupted();
+        self.gimbal_rad = saved.gimbal_rad;
+        self.model.motor = saved.motor;
     }
 }
 
@@ -330,12 +320,9 @@ mod tests {
         let mut estimate = pilot.estimate.expect("the pilot has an estimate");
         estimate.state.rate_rad_s = Vector3::new(2.0, 0.5, -0.3);
         pilot.estimate = Some(estimate);
-        let found = falling()
-            .resumed(&pilot.saved(), estimate.time_s + 0.2)
-            .estimator
-            .estimate()
-            .state
-            .world_from_body;
+        let mut resumed = falling();
+        resumed.resume(&pilot.saved(), estimate.time_s + 0.2);
+        let found = resumed.estimator.estimate().state.world_from_body;
         let turned = UnitQuaternion::from_scaled_axis(estimate.state.rate_rad_s * 0.2);
         let expected = estimate.state.world_from_body * turned;
         assert!(found.angle_to(&expected) < 1e-6, "{}", found.angle_to(&expected));

@@ -5,6 +5,7 @@ use std::io::{Cursor, Read as _, Write as _};
 use std::rc::Rc;
 use std::sync::OnceLock;
 
+use allocation_counter::measure;
 use embedded_sdmmc::{Block, BlockCount, BlockIdx};
 use fatfs::{FatType, FileSystem, FormatVolumeOptions, FsOptions, format_volume};
 use prost::Message as _;
@@ -40,7 +41,8 @@ struct Feeder {
 impl Feeder {
     fn feed(&mut self, frames: usize) {
         for (frame, record) in flown().0.iter().skip(self.next).take(frames) {
-            self.appender.append(*frame, record);
+            let heap = measure(|| self.appender.append(*frame, record));
+            assert_eq!((heap.count_total, heap.bytes_current), (0, 0), "frame {frame} uses the heap");
         }
         self.next += frames;
     }

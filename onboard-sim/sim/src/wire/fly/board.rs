@@ -61,7 +61,7 @@ pub enum BoardError {
 }
 
 /// A board at the other end of two pipes.
-pub(super) struct OnBoard {
+pub struct OnBoard {
     frames: File,
     answers: Receiver<io::Result<Answer>>,
     begin: Begin,
@@ -74,7 +74,10 @@ pub(super) struct OnBoard {
 
 impl OnBoard {
     /// Opens the pipes in a folder; waits until the board has opened them, too.
-    pub(super) fn open(folder: &Path, mission_toml: &str, on_the_air: OnTheAir) -> Result<Self, BoardError> {
+    ///
+    /// # Errors
+    /// The pipes cannot be opened.
+    pub fn open(folder: &Path, mission_toml: &str, on_the_air: OnTheAir) -> Result<Self, BoardError> {
         let opened = |name: &str, options: &OpenOptions| {
             let path = folder.join(name);
             options.open(&path).map_err(|source| BoardError::Pipe { path, source })
@@ -112,7 +115,10 @@ impl OnBoard {
     }
 
     /// Steps the vehicle by one frame with the board's radio input; the board decides it, too.
-    pub(super) fn step(&mut self, vehicle: &mut Vehicle) -> Result<Vec<VehicleEvent>, BoardError> {
+    ///
+    /// # Errors
+    /// The board is silent, has ended or has decided differently.
+    pub fn step(&mut self, vehicle: &mut Vehicle) -> Result<Vec<VehicleEvent>, BoardError> {
         let UplinkState { uplink, commander, requests } = self.uplink_state()?;
         vehicle.set_uplink(uplink, commander);
         let events = vehicle.step(&requests).events;

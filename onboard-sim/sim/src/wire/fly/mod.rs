@@ -26,8 +26,7 @@ use protocol::log::v1::LandingVerdict;
 use protocol::transport::LinkAddress;
 use tokio::sync::watch;
 
-use self::board::OnBoard;
-pub use self::board::{BoardError, OnTheWire};
+pub use self::board::{BoardError, OnBoard, OnTheWire};
 pub(crate) use self::links::Delayed;
 use self::links::{Links, operators_of, people_of};
 use self::load::AutoStart;
