@@ -8,7 +8,7 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 
 use anyhow::{Context as _, bail};
-use foxglove::Context;
+use foxglove::{Context, WebSocketServerHandle};
 use tokio::sync::oneshot;
 
 use super::programs::in_a_thread;
@@ -47,11 +47,11 @@ impl Live {
             let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
             runtime.block_on(async {
                 let server = server.start().await;
-                let port = server.as_ref().map(|server| server.port());
+                let port = server.as_ref().map(WebSocketServerHandle::port);
                 let _ = opened.send(port.map_err(ToString::to_string));
                 // The sender is dropped, which is the end.
                 let _ = ended.await;
-                drop(server.map(|server| server.stop()));
+                drop(server.map(WebSocketServerHandle::stop));
             });
             Ok(())
         };

@@ -30,8 +30,8 @@ fn demonstration(folder: &std::path::Path) -> (Child, impl Iterator<Item = Strin
 /// What a client receives: the channels by topic, with their ids, and the records by id.
 async fn record_until_the_end(url: String) -> (BTreeMap<String, (u64, Value)>, BTreeMap<u64, Vec<Vec<u8>>>) {
     let connected = || async {
-        let mut request = url.clone().into_client_request().unwrap();
-        request.headers_mut().insert("sec-websocket-protocol", "foxglove.sdk.v1".parse().unwrap());
+        let mut request = url.clone().into_client_request().expect("an address");
+        request.headers_mut().insert("sec-websocket-protocol", "foxglove.sdk.v1".parse().expect("a header"));
         tokio_tungstenite::connect_async(request).await.expect("the station listens").0
     };
     // The second one subscribes to everything and reads nothing.
@@ -40,22 +40,22 @@ async fn record_until_the_end(url: String) -> (BTreeMap<String, (u64, Value)>, B
     while let Some(Ok(message)) = socket.next().await {
         match message {
             Message::Text(text) => {
-                let text: Value = serde_json::from_str(&text).unwrap();
+                let text: Value = serde_json::from_str(&text).expect("JSON");
                 let advertised = text["channels"].as_array().cloned().unwrap_or_default();
                 let ids: Vec<Value> = advertised.iter().map(|channel| channel["id"].clone()).collect();
                 for channel in advertised {
-                    let topic = channel["topic"].as_str().unwrap().to_owned();
-                    channels.insert(topic, (channel["id"].as_u64().unwrap(), channel));
+                    let topic = channel["topic"].as_str().expect("a topic").to_owned();
+                    channels.insert(topic, (channel["id"].as_u64().expect("an id"), channel));
                 }
                 let wanted: Vec<Value> = ids.iter().map(|id| json!({ "id": id, "channelId": id })).collect();
                 let subscribe = json!({ "op": "subscribe", "subscriptions": wanted }).to_string();
                 for client in [&mut hung, &mut socket] {
-                    client.send(Message::Text(subscribe.clone().into())).await.unwrap();
+                    client.send(Message::Text(subscribe.clone().into())).await.expect("the station listens");
                 }
             }
             // One byte 1, the id of the subscription, the time of the log, and the record.
             Message::Binary(bytes) if bytes[0] == 1 => {
-                let id = u32::from_le_bytes(bytes[1..5].try_into().unwrap());
+                let id = u32::from_le_bytes(bytes[1..5].try_into().expect("four bytes"));
                 messages.entry(id.into()).or_default().push(bytes[13..].to_vec());
             }
             _ => {}
@@ -70,10 +70,11 @@ fn a_client_receives_the_records_of_the_log() {
     let folder = tempfile::tempdir().unwrap();
     let (mut child, mut lines) = demonstration(folder.path());
     let url = lines.find_map(|line| Some(line[line.find("ws://")?..].to_owned())).expect("an address");
-    let client = std::thread::spawn(|| {
+    let client = std::thread::Builder::new().spawn(|| {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         runtime.block_on(record_until_the_end(url))
     });
+    let client = client.unwrap();
     let rest: Vec<String> = lines.collect();
     assert!(child.wait().unwrap().success(), "{rest:?}");
     let (channels, messages) = client.join().unwrap();
@@ -86,7 +87,7 @@ fn a_client_receives_the_records_of_the_log() {
         let channel = reader.channel(channel_id).unwrap();
         if channel.message_encoding == "protobuf" {
             schemas.insert(channel.topic.clone(), channel.schema_name.clone());
-            logged.entry(channel.topic.clone()).or_default().push(data.to_vec());
+            logged.entry(channel.topic.clone()).or_default().push(data);
         }
     }
     let advertised: BTreeMap<String, String> = channels
