@@ -1,5 +1,6 @@
 //! The command line: every command, flag and help text.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
@@ -166,6 +167,11 @@ pub struct Flags {
     /// Default: touchdown-YYYYMMDD-HHMMSS.mcap (UTC) in the current directory.
     #[arg(long, value_name = "FILE|none", help_heading = "Station")]
     pub log: Option<LogChoice>,
+
+    /// Serve the decoded records of the log live to Foxglove or Lichtblick, over a WebSocket at
+    /// this address; port 0 is any free one. Whoever can connect can read, and nobody can command.
+    #[arg(long, value_name = "ADDRESS:PORT", help_heading = "Station")]
+    pub foxglove: Option<SocketAddr>,
 
     /// Forward every received frame to udpout:HOST:PORT, for a map, an antenna tracker or an
     /// overlay; may be given more than once. One way: what comes back is never read.

@@ -127,7 +127,15 @@ impl Config {
             flags
         } else {
             let link = LinkArgs { connect: Vec::new(), key: None, crew: None, ..flags.link };
-            Flags { link, mission: None, checklist: None, position: None, forward: Vec::new(), ..flags }
+            Flags {
+                link,
+                mission: None,
+                checklist: None,
+                position: None,
+                foxglove: None,
+                forward: Vec::new(),
+                ..flags
+            }
         };
         Ok(station.flags.update_from_arg_matches(given)?)
     }
@@ -224,6 +232,7 @@ mod tests {
         let others = [
             ("connect", connect),
             ("forward", forward),
+            ("foxglove", "127.0.0.1:9"),
             ("sysid", "4"),
             ("vehicle_sysid", "5"),
             ("position", "serial:/dev/ttyACM0:9600"),

@@ -21,7 +21,7 @@ fn header() -> LogHeader {
         start_unix_ns: 1_700_000_000_000_000_000,
         run: BTreeMap::from([("seed".to_owned(), "7".to_owned())]),
         profile_toml: Some("name = \"x\"".to_owned()),
-        scenario_toml: None,
+        ..LogHeader::default()
     }
 }
 

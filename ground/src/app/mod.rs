@@ -8,6 +8,7 @@ mod backlog;
 pub mod clock;
 pub mod download;
 pub mod files;
+mod live;
 mod next_log;
 pub mod output;
 pub mod pace;
@@ -56,6 +57,7 @@ use attached::Viewer;
 use background::Background;
 use clock::{Clock, LogTime};
 use files::{LogGuard, LogWatch, newest_place, open_checklist, open_log, other_name, read_unfinished};
+use live::Live;
 use next_log::NextLog;
 use output::{Lines, Output, print};
 use position::Locator;
@@ -169,7 +171,8 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
     // A demonstration flies this mission, so it cannot fly another.
     let named = args.flags.mission.as_deref().filter(|_| demo_options.is_none());
     let mission = named.map(load_flight).transpose()?.map(|flight| flight.recipe);
-    let header = match &demo_options {
+    let live = args.flags.foxglove.map(|at| Live::open(at, args.flags.log.as_ref())).transpose()?;
+    let mut header = match &demo_options {
         // It contains both sides.
         Some(options) => options.flight.log_header("ground", clock.start_unix_ns()),
         None => LogHeader {
@@ -179,6 +182,7 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
             ..LogHeader::default()
         },
     };
+    header.live = live.as_ref().map(|live| Arc::clone(&live.context));
     let recorder = open_log(args.flags.log.as_ref(), demo_options.is_none(), &header)?;
     let log_guard = LogGuard::new(recorder);
     let next_log = NextLog::new(args, header, Arc::clone(&log_guard.0));
@@ -190,6 +194,9 @@ async fn session(args: &StationArgs, config: &Config, duty: Duty) -> anyhow::Res
                 return Err(error);
             }
         };
+    if let Some(live) = &live {
+        station.model.info(clock.now(), format!("live values for Foxglove: ws://{}", live.at));
+    }
     if duty.is_daemon {
         print(output::greeting(&station.model).as_bytes())?;
     }

@@ -175,7 +175,7 @@ impl Drop for Lines {
 /// Whether an event is about the flight rather than about its commands: the reader of a
 /// demonstration without a screen wants to see the flight. The log has every event.
 fn is_of_the_flight(event: &Event) -> bool {
-    let of_interest = ["demonstration", "phase ", Ending::Stands.word()];
+    let of_interest = ["demonstration", "live values", "phase ", Ending::Stands.word()];
     let by_ground = event.speaker == Speaker::Ground && event.level == EventLevel::Info;
     let of_the_solver = event.text.starts_with("controller level");
     (!by_ground || of_interest.iter().any(|words| event.text.starts_with(words))) && !of_the_solver

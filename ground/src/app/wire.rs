@@ -130,6 +130,7 @@ impl Wire {
             let any: IpAddr =
                 if to.is_ipv4() { Ipv4Addr::UNSPECIFIED.into() } else { Ipv6Addr::UNSPECIFIED.into() };
             let socket = UdpSocket::bind((any, 0)).and_then(|socket| {
+                socket.set_broadcast(true)?;
                 socket.connect(to)?;
                 socket.set_nonblocking(true)?;
                 Ok(socket)
@@ -431,7 +432,7 @@ mod tests {
         assert_eq!((recorded + reported_drops, bytes), (FRAMES, reported_bytes));
     }
 
-    /// A phone's map receives the station's frames, and its own frames are not accepted.
+    /// A phone's map and a whole network receive the station's frames; an answer is not accepted.
     #[test]
     fn a_listener_receives_the_vehicle_and_its_frames_are_ignored() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
@@ -441,7 +442,9 @@ mod tests {
             let time = LogTime::Run(clock);
             let mut wire = Wire::open((GROUND, VEHICLE), link, None, clock, None, time).await.unwrap();
             let phone = UdpSocket::bind("127.0.0.1:0").unwrap();
-            wire.forward_to(&[phone.local_addr().unwrap().to_string()]).unwrap();
+            let anybody = UdpSocket::bind("0.0.0.0:0").unwrap();
+            let network = format!("127.255.255.255:{}", anybody.local_addr().unwrap().port());
+            wire.forward_to(&[phone.local_addr().unwrap().to_string(), network]).unwrap();
             let Some(LinkAddress::UdpIn(station)) = wire.endpoints().next().cloned() else { panic!() };
             let vehicle = UdpSocket::bind("127.0.0.1:0").unwrap();
             let (mut said, mut stranger) = (Encoder::new(VEHICLE), Encoder::new(GROUND));
@@ -459,6 +462,8 @@ mod tests {
                 assert_eq!(frames, std::slice::from_ref(&frame));
                 let mut bytes = [0; 300];
                 let (count, from) = phone.recv_from(&mut bytes).unwrap();
+                assert_eq!(&bytes[..count], frame.as_bytes());
+                let count = anybody.recv(&mut bytes).unwrap();
                 assert_eq!(&bytes[..count], frame.as_bytes());
                 let answer = stranger.encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
                 phone.send_to(answer.as_bytes(), from).unwrap();

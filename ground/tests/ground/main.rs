@@ -21,6 +21,7 @@ mod in_space;
 mod keys;
 mod ladder;
 mod links;
+mod live;
 mod lossy_link;
 mod pad_check;
 mod phases;

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::io::{Seek, Write};
+use std::sync::Arc;
 
+use foxglove::{Context, PartialMetadata, RawChannel, Schema};
 use mcap::records::MessageHeader;
 
 use super::build::build_info;
@@ -32,6 +34,8 @@ pub struct LogHeader {
     pub profile_toml: Option<String>,
     /// The scenario's text, which the random draws are made from, if there is one.
     pub scenario_toml: Option<String>,
+    /// Where the decoded records are published, too, while they are written.
+    pub live: Option<Arc<Context>>,
 }
 
 #[derive(Debug, thiserror::Error)]
@@ -48,11 +52,20 @@ pub enum LogWriteError {
     },
 }
 
+/// A channel of the log, the number of its last message, and the same channel for live values.
+#[derive(Clone)]
+struct Channel {
+    id: u16,
+    sequence: u32,
+    live: Option<Arc<RawChannel>>,
+}
+
 /// Writes records as MCAP messages and opens channels as they are needed.
 pub struct LogWriter<W: Write + Seek> {
     writer: mcap::Writer<W>,
     start_unix_ns: u64,
-    channels: BTreeMap<(String, String), (u16, u32)>,
+    channels: BTreeMap<(String, String), Channel>,
+    live: Option<Arc<Context>>,
     buffer: Vec<u8>,
 }
 
@@ -92,6 +105,7 @@ impl<W: Write + Seek> LogWriter<W> {
             writer,
             start_unix_ns: header.start_unix_ns,
             channels: BTreeMap::new(),
+            live: header.live.clone(),
             buffer: Vec::new(),
         })
     }
@@ -196,7 +210,7 @@ impl<W: Write + Seek> LogWriter<W> {
         buffer.clear();
         encode(&mut buffer)?;
         let channel = self.channel(topic, "protobuf", schema, &BTreeMap::new())?;
-        let written = self.put(channel, log_time, &buffer);
+        let written = self.put(&channel, log_time, &buffer);
         self.buffer = buffer;
         written
     }
@@ -214,7 +228,7 @@ impl<W: Write + Seek> LogWriter<W> {
         // Every channel has a schema: some readers refuse a file with a channel that has none.
         let schema = ("mavlink2.Frame", RAW_FRAME_SCHEMA);
         let channel = self.channel(topic, ENCODING_MAVLINK, Some(schema), &metadata)?;
-        self.put(channel, log_time, &frame.bytes)
+        self.put(&channel, log_time, &frame.bytes)
     }
 
     fn channel(
@@ -223,33 +237,42 @@ impl<W: Write + Seek> LogWriter<W> {
         encoding: &str,
         schema: Option<(&str, &[u8])>,
         metadata: &BTreeMap<String, String>,
-    ) -> Result<(u16, u32), LogWriteError> {
+    ) -> Result<Channel, LogWriteError> {
         let distinction = metadata.values().map(String::as_str).collect::<Vec<_>>().join(" ");
         let key = (topic.to_owned(), distinction);
-        if let Some((id, sequence)) = self.channels.get_mut(&key) {
-            *sequence += 1;
-            return Ok((*id, *sequence));
+        if let Some(channel) = self.channels.get_mut(&key) {
+            channel.sequence += 1;
+            return Ok(channel.clone());
         }
+        let is_protobuf = encoding == "protobuf";
         let schema_id = match schema {
             Some((name, data)) => {
-                let schema_encoding = if encoding == "protobuf" { "protobuf" } else { "text" };
-                self.writer.add_schema(name, schema_encoding, data)?
+                self.writer.add_schema(name, if is_protobuf { encoding } else { "text" }, data)?
             }
             None => 0,
         };
         let id = self.writer.add_channel(schema_id, topic, encoding, metadata)?;
-        self.channels.insert(key, (id, 0));
-        Ok((id, 0))
+        // The programs that show live values decode no raw frames.
+        let live = self.live.as_ref().filter(|_| is_protobuf).and_then(|live| {
+            let schema = schema.map(|(name, data)| Schema::new(name, encoding, data.to_vec()));
+            live.channel_builder(topic).message_encoding(encoding).schema(schema).build_raw().ok()
+        });
+        let channel = Channel { id, sequence: 0, live };
+        self.channels.insert(key, channel.clone());
+        Ok(channel)
     }
 
-    fn put(
-        &mut self,
-        (channel_id, sequence): (u16, u32),
-        log_time: u64,
-        data: &[u8],
-    ) -> Result<(), LogWriteError> {
+    fn put(&mut self, channel: &Channel, log_time: u64, data: &[u8]) -> Result<(), LogWriteError> {
+        if let Some(live) = &channel.live {
+            live.log_with_meta(data, PartialMetadata::with_log_time(log_time));
+        }
         // publish_time equals log_time because PlotJuggler requires it.
-        let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time,
+            publish_time: log_time,
+        };
         Ok(self.writer.write_to_known_channel(&header, data)?)
     }
 }

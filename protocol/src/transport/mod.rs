@@ -274,6 +274,29 @@ mod tests {
         });
     }
 
+    /// Every station of a network receives the vehicle, and each may answer it.
+    #[test]
+    fn a_station_answers_a_vehicle_that_broadcasts() {
+        run(async {
+            let station = UdpSocket::bind("0.0.0.0:0").await.unwrap();
+            let everyone = format!("127.255.255.255:{}", station.local_addr().unwrap().port());
+            let mut link = Transport::open(LinkAddress::UdpOut(everyone)).await.unwrap();
+            let mut bytes = [0; 4];
+            link.sender().send(b"all1".to_vec());
+            let (_, vehicle) = station.recv_from(&mut bytes).await.unwrap();
+            station.send_to(b"here", vehicle).await.unwrap();
+            let origin = next_origin(&mut link).await;
+            while !matches!(link.receive().await, Some(Received::Up(_))) {}
+            // A datagram for every station arrives once.
+            link.sender().send(b"all2".to_vec());
+            link.sender().send_to(b"mine".to_vec(), Some(origin));
+            for expected in [b"all2", b"mine"] {
+                station.recv(&mut bytes).await.unwrap();
+                assert_eq!(&bytes, expected);
+            }
+        });
+    }
+
     #[test]
     fn on_tcp_bytes_for_one_sender_reach_that_one_alone() {
         run(async {

@@ -387,6 +387,7 @@ pub fn write_log(
         // It keeps its mission; its settings change in flight.
         profile_toml: recording.profile_toml().ok().map(str::to_owned),
         scenario_toml: recording.head.scenario_toml.clone(),
+        live: None,
     };
     write_records(output, &header, &flight.records)
 }

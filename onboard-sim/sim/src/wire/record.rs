@@ -47,6 +47,7 @@ pub fn header(writer: &str, recipe: &Recipe, number: u64, start_unix_ns: u64) ->
             .collect::<BTreeMap<_, _>>(),
         profile_toml: Some(recipe.mission_toml.clone()),
         scenario_toml: Some(recipe.dispersion_toml.clone()),
+        live: None,
     }
 }
 

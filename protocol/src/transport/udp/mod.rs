@@ -1,5 +1,5 @@
 //! UDP links: `udpin` answers every sender of which a frame was accepted; `udpout` sends first, and
-//! only to one peer.
+//! only to one peer or to all of a network.
 
 mod peers;
 
@@ -41,10 +41,13 @@ pub(super) async fn connect(address: &str, queues: Queues) -> io::Result<()> {
     // The socket stays unconnected: otherwise an ICMP "port unreachable", from a ground that starts
     // later, would end the link.
     let socket = UdpSocket::bind(any).await?;
-    // The address may be that of a whole network.
+    // The system refuses the address of a whole network to a socket that may not broadcast.
+    let refused = std::net::UdpSocket::bind(any)?.connect(peer);
+    let is_network = refused.is_err_and(|error| error.kind() == io::ErrorKind::PermissionDenied);
     socket.set_broadcast(true)?;
+    let peers = if is_network { Peers::of_network(peer) } else { Peers::only(peer) };
     if queues.inbox.send(Received::Up(peer.to_string())).await.is_ok() {
-        tokio::spawn(run(socket, Peers::only(peer), queues));
+        tokio::spawn(run(socket, peers, queues));
     }
     Ok(())
 }
@@ -79,7 +82,7 @@ async fn run(socket: UdpSocket, mut peers: Peers, queues: Queues) {
             }
             outgoing = outbox.recv() => {
                 let Some((bytes, to)) = outgoing else { return };
-                for peer in peers.answered().filter(|peer| to.is_none_or(|to| to == Origin::Datagram(*peer))) {
+                for peer in peers.receivers(to) {
                     // A datagram that cannot be sent counts as lost; the link's statistics and
                     // heartbeats show it.
                     let _ = socket.send_to(&bytes, peer).await;

@@ -8,6 +8,7 @@ use std::net::SocketAddr;
 use std::time::Duration;
 
 use super::Standing;
+use crate::hub::Origin;
 
 /// Most proven senders answered at the same time; each costs the vehicle's complete telemetry,
 /// 2,000 bytes a second. Without a key every frame is valid, so there must be more entries than
@@ -50,6 +51,8 @@ struct UnknownSenders {
 pub(super) struct Peers {
     /// The only peer of a `udpout` link.
     fixed: Option<SocketAddr>,
+    /// The broadcast address of a `udpout` link, which receives what is for every peer.
+    network: Option<SocketAddr>,
     proven: Vec<Proven>,
     guest: Option<(SocketAddr, Duration)>,
     strangers: UnknownSenders,
@@ -65,6 +68,7 @@ impl Peers {
     pub(super) fn any() -> Self {
         Self {
             fixed: None,
+            network: None,
             proven: Vec::new(),
             guest: None,
             strangers: UnknownSenders::default(),
@@ -78,6 +82,11 @@ impl Peers {
     /// A link with only this peer.
     pub(super) fn only(peer: SocketAddr) -> Self {
         Self { fixed: Some(peer), ..Self::any() }
+    }
+
+    /// A link to every host of a network, each of which may answer.
+    pub(super) fn of_network(broadcast: SocketAddr) -> Self {
+        Self { network: Some(broadcast), ..Self::any() }
     }
 
     /// Notes the sender of a datagram; returns `None` if its datagrams are to be dropped.
@@ -135,10 +144,14 @@ impl Peers {
         Some(Newcomer::Unnamed)
     }
 
-    /// The addresses to send to.
-    pub(super) fn answered(&self) -> impl Iterator<Item = SocketAddr> {
+    /// The addresses to send to: the one peer, or all.
+    pub(super) fn receivers(&self, to: Option<Origin>) -> Vec<SocketAddr> {
+        if let (None, Some(network)) = (to, self.network) {
+            return vec![network];
+        }
         let guest = self.guest.map(|(address, _)| address);
-        self.fixed.into_iter().chain(self.proven.iter().map(|peer| peer.address)).chain(guest)
+        let answered = self.fixed.into_iter().chain(self.proven.iter().map(|peer| peer.address)).chain(guest);
+        answered.filter(|peer| to.is_none_or(|to| to == Origin::Datagram(*peer))).collect()
     }
 
     fn schedule_report(&mut self, now: Duration) {
@@ -196,7 +209,7 @@ mod tests {
     }
 
     fn answered(peers: &Peers) -> Vec<SocketAddr> {
-        peers.answered().collect()
+        peers.receivers(None)
     }
 
     #[test]
