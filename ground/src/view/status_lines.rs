@@ -65,7 +65,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
             let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
             Some(("touchdown".to_owned(), within(left_s), String::new()))
         }
-        TdPhase::TD_PHASE_TOUCHDOWN => words("over", " once the motor is cool, or pinned"),
+        TdPhase::TD_PHASE_TOUCHDOWN => words("over", " when motor is cool or pin is in"),
         TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
         // On the pad the crew decides; afterwards the flight is over.
         _ => None,

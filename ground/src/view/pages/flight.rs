@@ -52,17 +52,19 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     };
     if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_silent(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
-        let (left, place, side) = if burns {
+        let (left, side) = if burns {
             let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
-            let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+            let [limits, below] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
             bars::draw_limits(model, theme, now, frame, limits);
-            (left, place, side)
+            let lines = values(model, theme, now, &["tilt", "turn rate", "horizontal speed"]);
+            table("flight", &lines, theme, frame, below);
+            (left, side)
         } else {
             let [left, place, side] = columns(area, [Fill(5), Fill(3), side]);
-            (left, place, side)
+            map(FROM_ABOVE, model, theme, now, frame, place);
+            (left, side)
         };
         height(model, theme, now, frame, left);
-        map(FROM_ABOVE, model, theme, now, frame, place);
         vehicle(model, &[Side::South], theme, now, frame, side);
         return area;
     }
