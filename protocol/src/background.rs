@@ -64,8 +64,9 @@ impl<T: Ord, O> Shared<T, O> {
         self.changed.notify_all();
         let idle = |queue: &mut Queue<T, O>| queue.jobs.is_empty() && !queue.ends;
         let mut queue = self.changed.wait_while(queue, idle).unwrap_or_else(PoisonError::into_inner);
-        queue.runs = true;
-        queue.jobs.pop_first().map(|(_, job)| job)
+        let job = queue.jobs.pop_first().map(|(_, job)| job);
+        queue.runs = job.is_some();
+        job
     }
 }
 
@@ -161,6 +162,15 @@ mod tests {
         });
         begins.recv().unwrap();
         stalled
+    }
+
+    /// Otherwise a program would wait at its end for a thread that has nothing to do.
+    #[test]
+    fn a_thread_that_has_ended_is_not_busy() {
+        let mut background = Background::<u8, ()>::start("test").unwrap();
+        background.end();
+        background.thread.take().unwrap().join().unwrap();
+        assert!(background.wait(Duration::ZERO));
     }
 
     #[test]

@@ -187,7 +187,7 @@ pub fn alarm_state(alarm: &Alarm, now: Duration) -> (&'static str, String, TextR
         Some(_) => ("ended alarm:", TextRole::Caution),
     };
     let age = match alarm.ended_at {
-        None => format!("{} s", since_s(alarm.raised_at)),
+        None => format!("{} s ago", since_s(alarm.raised_at)),
         Some(at) => format!("ended {} s ago", since_s(at)),
     };
     (word, age, role)

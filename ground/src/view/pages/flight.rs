@@ -25,7 +25,7 @@ const SIDE_COLUMNS: u16 = 18;
 /// The same for its predicted position.
 const LOST_COLUMNS: u16 = 28;
 /// Columns and rows of the six limits with their borders.
-const LIMIT_COLUMNS: u16 = 32;
+const LIMIT_COLUMNS: u16 = 36;
 pub const LIMIT_ROWS: u16 = 8;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
