@@ -64,9 +64,9 @@ impl<T: Ord, O> Shared<T, O> {
         self.changed.notify_all();
         let idle = |queue: &mut Queue<T, O>| queue.jobs.is_empty() && !queue.ends;
         let mut queue = self.changed.wait_while(queue, idle).unwrap_or_else(PoisonError::into_inner);
-        let job = queue.jobs.pop_first();
+        let job = queue.jobs.pop_first().map(|(_, job)| job);
         queue.runs = job.is_some();
-        job.map(|(_, job)| job)
+        job
     }
 }
 
@@ -166,6 +166,15 @@ mod tests {
         stalled
     }
 
+    /// Otherwise a program would wait at its end for a thread that has nothing to do.
+    #[test]
+    fn a_thread_that_has_ended_is_not_busy() {
+        let mut background = Background::<u8, ()>::start("test").unwrap();
+        background.end();
+        background.thread.take().unwrap().join().unwrap();
+        assert!(background.wait(Duration::ZERO));
+    }
+
     #[test]
     fn a_newer_job_of_a_target_replaces_the_waiting_one_and_urgent_jobs_run_first() {
         let background = Background::start("test").unwrap();
@@ -180,15 +189,6 @@ mod tests {
         assert!(background.wait(ENDS_WITHIN));
         assert_eq!(background.finish().len(), 4);
         assert_eq!(runs.try_iter().collect::<Vec<_>>(), ["wait", "signature", "position"]);
-    }
-
-    #[test]
-    fn nothing_is_waited_for_after_the_last_job() {
-        let mut background = Background::<u32, ()>::start("test").unwrap();
-        background.queue(1, || ());
-        background.end();
-        background.thread.take().unwrap().join().unwrap();
-        assert!(background.wait(Duration::ZERO));
     }
 
     #[test]

@@ -81,7 +81,7 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
     quantity("wind", "m/s", 1, |m, _| {
-        m.vehicle.of_descent(|d| libm::hypotf(d.wind_x_m_s, d.wind_y_m_s)).filter(is_estimated)
+        Some(m.vehicle.wind_m_s()?.map(|[north, east]| libm::hypot(*north, *east)))
     }),
     quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_x_m)),
     quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_y_m)),

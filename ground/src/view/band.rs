@@ -191,8 +191,9 @@ fn big(item: &Item, size: Size, theme: Theme, frame: &mut Frame, at: Rect) {
         return draw_line(frame, middle, Line::from(Span::styled(spaced, style)));
     }
     if style.bg.is_some() || item.role == TextRole::Alarm {
-        // Its background is one area, or the letters look torn.
-        let ground = Rect { width: (item.pixels * width).min(at.width), ..at };
+        // Its background is one area around the letters, or they look torn.
+        let (x, y) = (at.x.saturating_sub(1), at.y.saturating_sub(1));
+        let ground = Rect { x, y, width: 1 + (item.pixels * width).min(at.width), height: 1 + at.height };
         frame.buffer_mut().set_style(ground, style);
     }
     for (place, column) in columns(&item.text).enumerate() {

@@ -64,10 +64,12 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     };
     let in_table_2 = |verdict: Sample<Verdict>| verdict.value.landing.contains(TdLanding::TD_LANDING_TABLE_2);
     let outside_table_2 = vehicle.verdict().is_some_and(|verdict| !in_table_2(verdict));
-    let words = match at.value.violations() {
-        None if outside_table_2 => theme.line(" T2: the paper's Table 2 ", TextRole::Caution),
-        None => theme.line(" inside the envelope ", TextRole::Good),
-        Some(names) => theme.line(format!(" OUTSIDE {names} "), TextRole::Alarm),
+    let rows = limit_rows(&at.value, vehicle.limits().as_ref());
+    let failed: Vec<_> = rows.iter().filter(|row| !row.is_met).map(|row| row.name).collect();
+    let words = match () {
+        () if !failed.is_empty() => theme.line(format!(" OUTSIDE {} ", failed.join(", ")), TextRole::Alarm),
+        () if outside_table_2 => theme.line(" T2: the paper's Table 2 ", TextRole::Caution),
+        () => theme.line(" inside the envelope ", TextRole::Good),
     };
     let words = Some(words).filter(|words| words.width() + title.len() + 4 <= usize::from(area.width));
     let words = words.unwrap_or_default();
@@ -76,10 +78,9 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let ink = theme.ground().fg(theme.ink(if is_judged { Ink::Measured } else { Ink::Predicted }));
     let limit_ink = theme.ground().fg(theme.ink(Ink::Limit));
     let limit_columns = if inside.width < NARROW { 0 } else { LIMIT_COLUMNS };
-    let rows = limit_rows(&at.value, vehicle.limits().as_ref());
     for (row, y) in rows.into_iter().zip(inside.top()..inside.bottom()) {
         let at = Rect { y, height: 1, ..inside };
-        let table_2 = outside_table_2 && row.value.abs() > row.table_2;
+        let table_2 = outside_table_2 && row.is_met && row.value.abs() > row.table_2;
         let (word, word_role) = match () {
             () if !row.is_met => ("NO", TextRole::Alarm),
             () if table_2 => ("T2", TextRole::Caution),
@@ -93,7 +94,8 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let words = [theme.span(word, word_role), name, theme.span(value, strong(role))];
         draw_line(frame, at, Line::from_iter(words));
         let room = at.width.saturating_sub(BEFORE_BAR + limit_columns);
-        let mark = row.used.is_finite().then_some((LIMIT_AT, limit_ink));
+        let limit_at = if table_2 { LIMIT_AT * row.used * row.table_2 / row.value.abs() } else { LIMIT_AT };
+        let mark = row.used.is_finite().then_some((limit_at, limit_ink));
         bar([0.0, LIMIT_AT * row.used], ink, mark, frame, Rect { x: at.x + BEFORE_BAR, width: room, ..at });
         let words = theme.either_side(&format!(" {limit}"));
         let beside = Rect { x: at.right() - limit_columns, width: limit_columns, ..at };

@@ -109,7 +109,7 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         ];
     };
     let row = |label: &str, value: f64| {
-        let words = theme.either_side(&format!("{:>7} ±{} m", fixed(value, 1), fixed(at.spot.error_m, 1)));
+        let words = theme.either_side(&format!("{:>6} ±{} m", fixed(value, 0), fixed(at.spot.error_m, 0)));
         Line::from_iter([theme.label(format!(" {label:<6}pred")), theme.span(words, TextRole::Stale)])
     };
     let source = match at.basis {

@@ -65,7 +65,7 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
             let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);
             Some(("touchdown".to_owned(), within(left_s), String::new()))
         }
-        TdPhase::TD_PHASE_TOUCHDOWN => words("over", " once the motor is cool, or pinned"),
+        TdPhase::TD_PHASE_TOUCHDOWN => words("over", " when motor is cool or pin is in"),
         TdPhase::TD_PHASE_CHUTE => Some(under_chute(vehicle, now)),
         // On the pad the crew decides; afterwards the flight is over.
         _ => None,
@@ -187,7 +187,7 @@ pub fn alarm_state(alarm: &Alarm, now: Duration) -> (&'static str, String, TextR
         Some(_) => ("ended alarm:", TextRole::Caution),
     };
     let age = match alarm.ended_at {
-        None => format!("{} s", since_s(alarm.raised_at)),
+        None => format!("{} s ago", since_s(alarm.raised_at)),
         Some(at) => format!("ended {} s ago", since_s(at)),
     };
     (word, age, role)

@@ -25,7 +25,7 @@ const SIDE_COLUMNS: u16 = 18;
 /// The same for its predicted position.
 const LOST_COLUMNS: u16 = 28;
 /// Columns and rows of the six limits with their borders.
-const LIMIT_COLUMNS: u16 = 32;
+const LIMIT_COLUMNS: u16 = 36;
 pub const LIMIT_ROWS: u16 = 8;
 /// Rows of the panels under the pictures, with their borders.
 const BELOW_ROWS: u16 = 11;
@@ -52,17 +52,19 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     };
     if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_silent(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
-        let (left, place, side) = if burns {
+        let (left, side) = if burns {
             let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
-            let [limits, place] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+            let [limits, below] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
             bars::draw_limits(model, theme, now, frame, limits);
-            (left, place, side)
+            let lines = values(model, theme, now, &["tilt", "turn rate", "horizontal speed"]);
+            table("flight", &lines, theme, frame, below);
+            (left, side)
         } else {
             let [left, place, side] = columns(area, [Fill(5), Fill(3), side]);
-            (left, place, side)
+            map(FROM_ABOVE, model, theme, now, frame, place);
+            (left, side)
         };
         height(model, theme, now, frame, left);
-        map(FROM_ABOVE, model, theme, now, frame, place);
         vehicle(model, &[Side::South], theme, now, frame, side);
         return area;
     }

@@ -47,7 +47,7 @@ pub fn draw_pad(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             let wanted = if right.height < wanted + 4 { right.height } else { wanted };
             let [upper, below] = rows(right, [Length(wanted), Fill(1)]);
             table("checks", &lines, theme, frame, upper);
-            if !below.is_empty() {
+            if below.height > 2 {
                 events(model, theme, frame, below);
             }
         } else {

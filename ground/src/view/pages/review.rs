@@ -43,11 +43,11 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         let [left, mut right] = columns(area, [Fill(6), Fill(5)]);
         let found = findings(model, theme, usize::from(right.width.saturating_sub(2)));
         if model.vehicle.findings.count.is_some_and(|count| count > 0) {
-            // What went wrong first: half of the panel's height at most, or all of it where the map
-            // has no room.
+            // What went wrong first: half of the panel's height at most, or all of it where the
+            // pictures have no room.
             let wanted = u16::try_from(found.len()).unwrap_or(u16::MAX).saturating_add(2);
-            let most = if area.height < 14 { area.height } else { area.height / 2 };
-            let [above, below] = rows(right, [Length(wanted.min(most)), Fill(1)]);
+            let taken = if area.height < 14 { area.height } else { wanted.min(area.height / 2) };
+            let [above, below] = rows(right, [Length(taken), Fill(1)]);
             table(FINDINGS_TITLE, &found, theme, frame, above);
             right = below;
         }
@@ -56,7 +56,7 @@ pub fn draw_review(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         if below.height > 5 {
             height(model, theme, now, frame, below);
             map(FROM_ABOVE, model, theme, now, frame, right);
-        } else {
+        } else if right.height > 2 {
             let [place, flight] = columns(right, [Fill(1), Fill(1)]);
             map(FROM_ABOVE, model, theme, now, frame, place);
             height(model, theme, now, frame, flight);

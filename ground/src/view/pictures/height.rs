@@ -15,6 +15,8 @@ use crate::view::footer::{LENGTHS_S, recorded, shown_until};
 
 /// The least height and time that the picture shows.
 const TOP_MIN_M: f64 = 10.0;
+/// Greatest heights that the picture of a burn shows, m, in steps.
+const BURN_TOPS_M: [f64; 3] = [10.0, 20.0, 40.0];
 /// Columns and rows from one tick to the next, at least.
 const TICKS_APART: [u16; 2] = [7, 3];
 
@@ -43,13 +45,16 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let is_ignited = |(phase, _): &(TdPhase, Duration)| *phase == TdPhase::TD_PHASE_POWERED;
     let ignited = model.history.timeline.iter().any(is_ignited);
     let burn_at = vehicle.events.of(TdPhase::TD_PHASE_IGNITION).filter(|_| ignited);
-    // The burn fills the picture: the flight before it is irrelevant to its end.
+    // The burn fills the picture, and its last metres most: they decide.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
     let ignited_s = burn_at.map_or(present_s, |(burn_s, _)| burn_s.min(present_s));
-    let begins_s = if burns { (ignited_s - 1.0).floor().max(0.0) } else { 0.0 };
+    let present_m = vehicle.height_m().filter(|_| burns).map_or(f64::INFINITY, |height| height.value);
+    let zoom_m = BURN_TOPS_M.into_iter().find(|top_m| present_m < 0.9 * top_m).unwrap_or(f64::INFINITY);
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
-    let flown: Vec<(f64, f64)> = flown.filter(|(at, _)| *at >= begins_s).collect();
+    let is_shown = |(at, m): &(f64, f64)| *at >= 0.0 && (!burns || (*at >= ignited_s && *m <= zoom_m));
+    let flown: Vec<(f64, f64)> = flown.filter(is_shown).collect();
+    let begins_s = flown.first().filter(|_| burns).map_or(0.0, |(at, _)| *at);
     let reached = flown.iter().chain(&to_come).map(|(_, height_m)| *height_m).fold(TOP_MIN_M, f64::max);
     let top = [apogee_m, commit_m, band.map(|of| of.1)].into_iter().flatten().fold(reached, f64::max) * 1.08;
     let last_s = to_come.last().map_or(present_s, |(at, _)| *at).max(flown.last().map_or(0.0, |(at, _)| *at));
@@ -57,7 +62,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let length_s = LENGTHS_S.into_iter().find(|most_s| until == now && last_s < *most_s).unwrap_or(last_s);
     let recorded_s = model.playing.as_ref().map(|playing| seconds_since(recorded(playing).1, from));
     let length_s = recorded_s.filter(|s| *s >= last_s).unwrap_or(length_s);
-    let length_s = if burns { last_s.ceil().max(begins_s + 4.0) } else { length_s };
+    let length_s = if burns { last_s.max(begins_s + 2.0) } else { length_s };
     let bounds = ([begins_s, length_s], [0.0, top]);
     let plane = scales(bounds, TICKS_APART, "T+ s", theme, frame, area);
     let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
@@ -107,7 +112,8 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let rises = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
     let top = vehicle.events.of(TdPhase::TD_PHASE_DEPLOY).filter(|(at, _)| *at > 0.0);
     let labels = [
-        lights_at.map(|at| ((since_s, at.1), words("ignition ", at), predicted)),
+        // Its time is the vehicle's, beside the large number and on the time axis.
+        lights_at.map(|at| ((since_s, at.1), vec![format!("ignition {} m", whole(at.1))], predicted)),
         band.filter(|_| lights_at.is_none()).map(|(low_m, high_m)| {
             let words = format!("band {}..{}", whole(low_m), whole(high_m));
             ((since_s, f64::midpoint(low_m, high_m)), vec![words], good)

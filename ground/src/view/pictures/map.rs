@@ -174,7 +174,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     plane.write(frame, (0.0, 0.0), "+", strong);
     if let Some(at) = impact {
         plane.write(frame, at, "x", ink(Ink::Limit));
-        plane.beside(frame, at, &["if no light".to_owned(), "no light".to_owned()], ink(Ink::Limit));
+        plane.beside(frame, at, &["x: no light".to_owned()], ink(Ink::Limit));
     }
     if let Some(at) = down {
         plane.write(frame, (at.east_m, at.north_m), "×", ink(Ink::Predicted));
@@ -270,11 +270,7 @@ fn words(model: &Model, (fence_m, dot): (Option<f64>, f64), theme: Theme, frame:
 
 /// Where the wind blows to, as an arrow, and its speed.
 fn wind(model: &Model) -> String {
-    let reported =
-        model.vehicle.descent().map(|d| (f64::from(d.value.wind_x_m_s), f64::from(d.value.wind_y_m_s)));
-    let Some((north, east)) = reported.filter(|(north, east)| libm::hypot(*north, *east) > 0.0) else {
-        return String::new();
-    };
+    let Some([north, east]) = model.vehicle.wind_m_s().map(|wind| wind.value) else { return String::new() };
     let eighth = libm::round(libm::atan2(east, north).to_degrees() / 45.0).rem_euclid(8.0) as usize;
     let arrow = ["↑", "↗", "→", "↘", "↓", "↙", "←", "↖"][eighth];
     format!("wind {arrow} {} m/s", fixed(libm::hypot(north, east), 0))
