@@ -65,8 +65,12 @@ impl Flavor for Digest {
     #[inline]
     fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
         let (words, rest) = bytes.as_chunks::<WORD>();
-        words.iter().for_each(|word| self.append(*word));
-        rest.iter().for_each(|byte| self.append([*byte]));
+        for word in words {
+            self.append(*word);
+        }
+        for byte in rest {
+            self.append([*byte]);
+        }
         Ok(())
     }
 
