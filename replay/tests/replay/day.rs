@@ -162,7 +162,8 @@ fn a_burn_of_a_broken_sensor_is_not_found_and_leaves_the_lot_as_it_is() {
     assert!(!stdout.is_empty(), "{stderr}");
     std::fs::write(&fitted, stdout).unwrap();
     let lot = |logs: &[&str]| {
-        let (_, stdout, stderr) = learn(&[logs, &["--prior", "field", "--json"]].concat());
+        let (_, stdout, stderr) =
+            learn(&[logs, &["--mission", "mk3", "--prior", "field", "--json"]].concat());
         let answer: serde_json::Value = serde_json::from_str(&stdout).unwrap_or_else(|_| panic!("{stderr}"));
         answer["day"]["lots"].clone()
     };
