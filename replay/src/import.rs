@@ -71,15 +71,13 @@ pub fn import(file: &Path, output: &Path) -> Result<Imported> {
     let Track { mut samples, texts } = track.with_context(|| name.to_string())?;
     samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let first = samples.first().with_context(|| format!("{name}: no sample with a position"))?.clone();
-    for sample in &mut samples {
-        sample.time_s -= first.time_s;
-        for (value, origin) in [
-            (&mut sample.north_m, first.north_m),
-            (&mut sample.east_m, first.east_m),
-            (&mut sample.altitude_m, first.altitude_m),
-        ] {
-            *value = value.zip(origin).map(|(value, origin)| value - origin);
-        }
+    samples.iter_mut().for_each(|sample| sample.time_s -= first.time_s);
+    let counted: [fn(&mut Telemetry) -> &mut Option<f64>; 3] =
+        [|sample| &mut sample.north_m, |sample| &mut sample.east_m, |sample| &mut sample.altitude_m];
+    for value in counted {
+        // A receiver may have its first fix in flight.
+        let origin = samples.iter_mut().find_map(|sample| *value(sample)).unwrap_or_default();
+        samples.iter_mut().filter_map(|sample| value(sample).as_mut()).for_each(|value| *value -= origin);
     }
     let signals: [(&str, Value); 5] = [
         ("altitude", |sample| sample.altitude_m),
@@ -133,12 +131,19 @@ fn px4(file: &Path) -> Result<Track> {
         Ok(match fields.and_then(|fields| fields.get(name)) {
             Some(SomeVec::Float(values)) => values.iter().map(|value| f64::from(*value)).collect(),
             Some(SomeVec::UInt64(values)) => values.iter().map(|value| *value as f64 / 1e6).collect(),
+            Some(SomeVec::Bool(values)) => values.iter().map(|value| f64::from(u8::from(*value))).collect(),
             _ => bail!("no {name} of {topic}"),
         })
     };
-    let [times_s, x, y, z, vx, vy, vz] =
-        ["timestamp", "x", "y", "z", "vx", "vy", "vz"].map(|name| column("vehicle_local_position", name));
-    let (times_s, position, velocity) = (times_s?, [x?, y?, z?], [vx?, vy?, vz?]);
+    let times_s = column("vehicle_local_position", "timestamp")?;
+    // An estimate that is not valid reads 0.
+    let valid = |name: &str, flag: &str| -> Result<Vec<Option<f64>>> {
+        let flags = column("vehicle_local_position", flag).unwrap_or_default();
+        let values = column("vehicle_local_position", name)?.into_iter().enumerate();
+        Ok(values.map(|(row, value)| Some(value).filter(|_| flags.get(row) != Some(&0.0))).collect())
+    };
+    let position = [valid("x", "xy_valid")?, valid("y", "xy_valid")?, valid("z", "z_valid")?];
+    let velocity = [valid("vx", "v_xy_valid")?, valid("vy", "v_xy_valid")?, valid("vz", "v_z_valid")?];
     let turned =
         ["timestamp", "q[0]", "q[1]", "q[2]", "q[3]"].map(|name| column("vehicle_attitude", name).ok());
     let tilt_rad = |time_s: f64| {
@@ -149,7 +154,9 @@ fn px4(file: &Path) -> Result<Track> {
         Some(libm::acos(up.clamp(-1.0, 1.0)))
     };
     let sample = |(row, time_s): (usize, f64)| {
-        let here = |columns: &[Vec<f64>; 3]| columns.each_ref().map(|values| values.get(row).copied());
+        let here = |columns: &[Vec<Option<f64>>; 3]| {
+            columns.each_ref().map(|values| values.get(row).copied().flatten())
+        };
         Telemetry { time_s, tilt_rad: tilt_rad(time_s), ..moving(here(&position), here(&velocity)) }
     };
     Ok(Track { samples: times_s.into_iter().enumerate().map(sample).collect(), texts: Vec::new() })
@@ -160,10 +167,12 @@ fn ardupilot(file: &Path) -> Result<Track> {
     let mut track = Track::default();
     for entry in Reader::new(File::open(file)?) {
         let entry = entry?;
-        let time_s = entry.timestamp_usec.unwrap_or_default() as f64 / 1e6;
         let value = |name: &str| entry.get_f64(name);
+        // Until 2015 the time was in ms.
+        let old_s = || value("TimeMS").unwrap_or_default() / 1e3;
+        let time_s = entry.timestamp_usec.map_or_else(old_s, |time_us| time_us as f64 / 1e6);
         match entry.name.as_str() {
-            "XKF1" | "NKF1" if value("C").unwrap_or(0.0) <= 0.0 => track.samples.push(Telemetry {
+            "XKF1" | "NKF1" | "EKF1" if value("C").unwrap_or(0.0) <= 0.0 => track.samples.push(Telemetry {
                 time_s,
                 tilt_rad: value("Pitch").map(|pitch_deg| (90.0 - pitch_deg).to_radians()),
                 ..moving(["PN", "PE", "PD"].map(value), ["VN", "VE", "VD"].map(value))
@@ -172,29 +181,47 @@ fn ardupilot(file: &Path) -> Result<Track> {
             _ => {}
         }
     }
-    ensure!(!track.samples.is_empty(), "no XKF1 or NKF1, the estimator's state");
+    ensure!(!track.samples.is_empty(), "no XKF1, NKF1 or EKF1, the estimator's state");
     Ok(track)
 }
 
 /// The names of a column in its programs, the first that is there, and the signal that it sets.
 type Column = (&'static [&'static str], fn(&mut Telemetry, f64));
 
+/// With their units where the programs write them; AltOS and CATS write none.
 const COLUMNS: [Column; 8] = [
-    (&["time", "time (s)"], |sample, value| sample.time_s = value),
-    (&["height", "altitude agl (m)", "altitude (m)", "z (m)"], |sample, value| {
-        sample.altitude_m = Some(value);
-    }),
-    (&["x (m)", "position east of launch (m)"], |sample, value| sample.east_m = Some(value)),
-    (&["y (m)", "position north of launch (m)"], |sample, value| sample.north_m = Some(value)),
-    (&["vx (m/s)"], |sample, value| sample.east_m_s = Some(value)),
-    (&["vy (m/s)"], |sample, value| sample.north_m_s = Some(value)),
-    (&["vz (m/s)", "vertical velocity (m/s)", "speed", "accel_speed"], |sample, value| {
-        sample.climb_m_s = Some(value);
-    }),
-    (&["attitude angle (\u{b0})", "vertical orientation (zenith) (\u{b0})"], |sample, value| {
+    (&["time", "time s", "ts", "t s"], |sample, value| sample.time_s = value),
+    (
+        &["height", "filtered_altitude_agl", "altitude agl m", "altitude m", "alt m", "z m"],
+        |sample, value| sample.altitude_m = Some(value),
+    ),
+    (&["x m", "position east of launch m"], |sample, value| sample.east_m = Some(value)),
+    (&["y m", "position north of launch m"], |sample, value| sample.north_m = Some(value)),
+    (&["vx m/s"], |sample, value| sample.east_m_s = Some(value)),
+    (&["vy m/s"], |sample, value| sample.north_m_s = Some(value)),
+    (
+        &["vz m/s", "vertical velocity m/s", "velocity m/s", "speed", "accel_speed", "velocity"],
+        |sample, value| sample.climb_m_s = Some(value),
+    ),
+    (&["attitude angle \u{b0}", "vertical orientation (zenith) \u{b0}"], |sample, value| {
         sample.tilt_rad = Some((90.0 - value).to_radians());
     }),
 ];
+
+/// A head of a table: its name with its unit, in lower case, and the size of the unit. Feet become
+/// metres.
+fn head_of(text: &str) -> (String, f64) {
+    let text = text.trim_matches(['#', ' ', '\u{feff}', '"']).to_lowercase();
+    let Some((name, unit)) = text.trim_end_matches([')', ']']).rsplit_once(['(', '[']) else {
+        return (text, 1.0);
+    };
+    let (unit, size) = match unit.trim() {
+        "ft" => ("m", 0.3048),
+        "ft/s" => ("m/s", 0.3048),
+        unit => (unit, 1.0),
+    };
+    (format!("{} {unit}", name.trim()), size)
+}
 
 /// The phase of a state of AltOS.
 fn phase_of(state: &str) -> Option<u32> {
@@ -223,16 +250,15 @@ fn text_of(bytes: &[u8]) -> Result<String> {
     }
 }
 
-/// The names in the head of a table, in lower case.
-fn names_of<'a>(head: impl Iterator<Item = &'a str>) -> Option<Vec<String>> {
-    let name = |name: &str| name.trim_matches(['#', ' ', '\u{feff}', '"']).to_lowercase();
-    let names: Vec<String> = head.map(name).collect();
-    COLUMNS[0].0.iter().any(|time| names.iter().any(|name| name == time)).then_some(names)
+/// The head of a table, if it has a column of times.
+fn heads_of<'a>(row: impl Iterator<Item = &'a str>) -> Option<Vec<(String, f64)>> {
+    let heads: Vec<_> = row.map(head_of).collect();
+    heads.iter().any(|(head, _)| COLUMNS[0].0.contains(&head.as_str())).then_some(heads)
 }
 
 fn table(file: &Path) -> Result<Track> {
     let text = text_of(&std::fs::read(file)?)?;
-    let is_head = |separator: &char| text.lines().any(|line| names_of(line.split(*separator)).is_some());
+    let is_head = |separator: &char| text.lines().any(|line| heads_of(line.split(*separator)).is_some());
     let separator = [',', ';', '\t'].into_iter().find(is_head).context(
         "no line has the head of a column of times, `time` or `Time (s)`, between commas, semicolons or tabs",
     )?;
@@ -243,7 +269,7 @@ fn table(file: &Path) -> Result<Track> {
         .delimiter(separator as u8)
         .from_reader(text.as_bytes())
         .into_records();
-    let mut heads: Vec<String> = Vec::new();
+    let mut heads = Vec::new();
     let mut samples = Vec::new();
     let mut pad = None;
     for row in rows {
@@ -251,7 +277,7 @@ fn table(file: &Path) -> Result<Track> {
         let line = row.position().map_or(0, csv::Position::line);
         let first = row.get(0).unwrap_or_default();
         if heads.is_empty() || first.starts_with('#') {
-            heads = names_of(row.iter()).unwrap_or(heads);
+            heads = heads_of(row.iter()).unwrap_or(heads);
             continue;
         }
         let values = row.iter().enumerate().filter(|(_, value)| !value.is_empty());
@@ -261,17 +287,23 @@ fn table(file: &Path) -> Result<Track> {
             "line {line}: {values} values under {} heads: is the decimal sign the separator, too?",
             heads.len()
         );
-        let cell = |name: &str| row.get(heads.iter().position(|head| head == name)?);
+        let place = |name: &str| heads.iter().position(|(head, _)| head == name);
+        let cell = |name: &str| row.get(place(name)?);
+        if samples.is_empty() && row.len() < heads.len() {
+            let [values, heads] = [row.len(), heads.len()];
+            print_note(&format!(
+                "warning: line {line}: {values} values under {heads} heads: are they in place?"
+            ));
+        }
         let mut sample = Telemetry::default();
         for (names, set) in COLUMNS {
-            let Some((name, text)) = names.iter().find_map(|name| Some((name, cell(name)?))) else {
-                continue;
-            };
+            let found = names.iter().find_map(|name| Some((name, cell(name)?, heads[place(name)?].1)));
+            let Some((name, text, size)) = found else { continue };
             let number = if separator == ',' { text.to_owned() } else { text.replace(',', ".") };
             let value: f64 =
                 number.parse().with_context(|| format!("line {line}, {name}: {text}: not a number"))?;
             if value.is_finite() {
-                set(&mut sample, value);
+                set(&mut sample, size * value);
             }
         }
         sample.phase = cell("state_name").and_then(phase_of);

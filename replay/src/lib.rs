@@ -132,7 +132,7 @@ enum Command {
         after_help = "Examples:\n  replay export flight.mcap --out tables\n  replay export flight.mcap --out flight.kml"
     )]
     Export(export::Args),
-    /// Imports a flight of another program: PX4 (.ulg), ArduPilot (.bin), and .csv of AltOS,
+    /// Imports a flight of another program: PX4 (.ulg), ArduPilot (.bin), and .csv of AltOS, CATS,
     /// RocketPy and OpenRocket.
     ///
     /// The log has position from the first sample, velocity and tilt, and the messages of

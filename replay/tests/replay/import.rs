@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use protocol::log::v1::Telemetry;
 use replay::import::import;
 use replay::info::{GradeLevel, info};
 use replay::log::Recording;
@@ -148,6 +149,79 @@ fn val_hand_a_px4_file() {
     assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-3, "{last:?}");
 }
 
+/// Imports an excerpt of a real flight (`flights/README.md`).
+fn real(name: &str) -> (Recording, Vec<&'static str>) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/replay/flights").join(name);
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("log.mcap");
+    let missing = import(&file, &log).unwrap().missing;
+    assert!(report(&log).unwrap().html.contains("<svg"), "{name}");
+    (Recording::open(&log).unwrap(), missing)
+}
+
+#[test]
+fn val_rocketpy_a_flight_of_a_telemetrum() {
+    let (flight, missing) = real("altos-telemetrum.csv");
+    assert_eq!(missing, ["horizontal velocity", "tilt"]);
+    let highest =
+        flight.telemetry.iter().max_by(|a, b| a.altitude_m.partial_cmp(&b.altitude_m).unwrap()).unwrap();
+    // Heights count from the first sample.
+    assert!((highest.altitude_m.unwrap() - (3889.30 + 0.19)).abs() < 1e-6, "{highest:?}");
+    assert!((highest.time_s - 30.17).abs() < 1e-6, "{highest:?}");
+    let last = flight.telemetry.last().unwrap();
+    // 0.0099953 deg of latitude, at 110.90 km a degree there.
+    assert!((last.north_m.unwrap() - 1108.5).abs() < 1.5, "{last:?}");
+    assert!((last.east_m.unwrap() + 0.0040083 * 93_500.0).abs() < 1.5, "{last:?}");
+}
+
+#[test]
+fn val_rocketpy_a_flight_of_a_cats_vega() {
+    let (flight, missing) = real("cats-vega.csv");
+    assert_eq!(missing, ["position", "horizontal velocity", "tilt"]);
+    assert_eq!(flight.telemetry.len(), 50);
+    let highest = flight.telemetry.iter().filter_map(|sample| sample.altitude_m).fold(0.0, f64::max);
+    assert!((highest - 5229.33).abs() < 0.2, "{highest}");
+}
+
+/// PX4 writes zeros for what it does not estimate, and says so in flags.
+#[test]
+fn val_pyulog_a_hop_whose_position_is_valid_from_the_middle_on() {
+    let (flight, missing) = real("px4.ulg");
+    assert!(missing.is_empty(), "{missing:?}");
+    let count = |value: fn(&Telemetry) -> Option<f64>| flight.telemetry.iter().filter_map(value).count();
+    assert_eq!(flight.telemetry.len(), 27);
+    assert_eq!((count(|sample| sample.north_m), count(|sample| sample.altitude_m)), (18, 26));
+    let first = flight.telemetry.iter().find_map(|sample| sample.north_m);
+    assert_eq!(first, Some(0.0), "positions count from the first valid one");
+}
+
+/// The receiver's first fix comes in flight.
+#[test]
+fn a_position_that_begins_late_counts_from_its_first_fix() {
+    let directory = tempfile::tempdir().unwrap();
+    let (file, log) = (directory.path().join("a.csv"), directory.path().join("log.mcap"));
+    std::fs::write(&file, "time,height,latitude,longitude\n0,1,0,0\n1,5,35.0,-117.0\n2,9,35.001,-117.0\n")
+        .unwrap();
+    assert_eq!(import(&file, &log).unwrap().missing, ["climb", "horizontal velocity", "tilt"]);
+    let north: Vec<_> =
+        Recording::open(&log).unwrap().telemetry.iter().map(|sample| sample.north_m).collect();
+    assert!(north[0].is_none() && north[1] == Some(0.0), "{north:?}");
+    assert!((north[2].unwrap() - 110.94).abs() < 0.1, "{north:?}");
+}
+
+/// OpenRocket writes in the units that its user has chosen.
+#[test]
+fn val_hand_a_table_in_feet() {
+    let directory = tempfile::tempdir().unwrap();
+    let (file, log) = (directory.path().join("a.csv"), directory.path().join("log.mcap"));
+    std::fs::write(&file, "# Time (s),Altitude (ft),Vertical velocity (ft/s)\n0,0,0\n1,100,-10\n").unwrap();
+    import(&file, &log).unwrap();
+    let flight = Recording::open(&log).unwrap();
+    let last = flight.telemetry.last().unwrap();
+    assert!((last.altitude_m.unwrap() - 30.48).abs() < 1e-9, "{last:?}");
+    assert!((last.climb_m_s.unwrap() + 3.048).abs() < 1e-9, "{last:?}");
+}
+
 /// UTF-16 of both byte orders, semicolons with decimal commas, and tabs, as spreadsheets save them.
 #[test]
 fn val_hand_a_table_in_the_encodings_and_separators_of_spreadsheets() {
@@ -183,7 +257,7 @@ fn what_is_wrong_with_a_file_is_named() {
             "line 2: 4 values under 2 heads: is the decimal sign the separator",
         ),
         ("e.csv", b"time height\n1 5\n", "between commas, semicolons or tabs"),
-        ("a.bin", b"nothing of it", "no XKF1 or NKF1"),
+        ("a.bin", b"nothing of it", "no XKF1, NKF1 or EKF1"),
         ("a.ulg", b"nothing of it", "a.ulg"),
     ] {
         let file = directory.path().join(name);
