@@ -362,7 +362,7 @@ pub fn json(wind_m_s: f64, impacts: &[Impact], rule: &Rule) -> Value {
     let widest = widest(impacts);
     json!({
         "wind_m_s": wind_m_s, "cases": cases, "widest": widest.map(|(case, _)| case.name()),
-        "nobody_within_m": widest.map(|(_, radius)| exclusion_m(&radius, rule)),
+        "exclusion_m": widest.map(|(_, radius)| exclusion_m(&radius, rule)),
         "as_planned": landed_as_planned(impacts),
     })
 }

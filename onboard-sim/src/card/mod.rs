@@ -102,7 +102,7 @@ impl Card {
         let winds = self.flown.iter().zip(&judged).map(|((wind_m_s, impacts), judged)| {
             let mut wind = hazard::json(*wind_m_s, impacts, &self.rule);
             // As on the card: never less than in less wind.
-            wind["nobody_within_m"] = json!(judged.circle.map(|circle| circle.exclusion_m));
+            wind["exclusion_m"] = json!(judged.circle.map(|circle| circle.exclusion_m));
             wind
         });
         let (winds, recipe) = (winds.collect::<Vec<_>>(), &self.recipe);

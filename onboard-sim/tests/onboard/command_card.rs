@@ -122,7 +122,7 @@ fn a_card_is_complete_shows_the_time_left_and_gives_no_rate_of_two_flights() {
     let stands = &answer["winds"][1]["as_planned"]["stands"]["of"];
     assert_eq!((answer["mission"].as_str(), stands.as_u64()), (Some("mk2"), Some(2)));
     assert!(text.contains(answer["hash"].as_str().unwrap()), "{answer}");
-    assert!(answer["winds"][1]["nobody_within_m"].is_null() && answer["limit_m_s"].is_null(), "{answer}");
+    assert!(answer["winds"][1]["exclusion_m"].is_null() && answer["limit_m_s"].is_null(), "{answer}");
     assert_eq!(names(&directory.path().join("json")), names(&card));
 
     let stormy = [&["card", "--mission", "mk2", "--wind", "10", "--out", "stormy"], &few[..]].concat();
@@ -233,7 +233,7 @@ fn the_impact_area_is_reported_with_set_flights_interval_and_rule() {
     assert_eq!(stdout(&hazard(&["--out", "hazard.txt"])), "");
     assert_eq!(fs::read_to_string(directory.path().join("hazard.txt")).unwrap(), text);
     let answer = json(&hazard(&["--json"]));
-    let within_m = answer["winds"][1]["nobody_within_m"].as_f64().unwrap();
+    let within_m = answer["winds"][1]["exclusion_m"].as_f64().unwrap();
     assert!(text.contains(&format!("4 m/s: nobody within {within_m:.0} m")), "{answer} {text}");
     assert_eq!(answer["winds"][0]["cases"]["as planned"]["flights"], 1);
     let kind = stdout(&hazard(&["--dispersion", "field"]));
