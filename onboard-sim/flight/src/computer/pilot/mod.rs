@@ -265,8 +265,8 @@ impl Pilot {
 
     /// Gives this newly powered-up pilot the state saved before a reset that ended at `time_s`. The
     /// saved estimate is extrapolated over the lost time with the last measured rates and forces,
-    /// and gets the same uncertainty as at apogee. The buffers of the plans remain, so that no frame
-    /// allocates them.
+    /// and gets the same uncertainty as at apogee. The buffers of the plans remain, so that no
+    /// frame allocates them.
     pub(super) fn resume(&mut self, saved: &SavedPilot, time_s: f64) {
         if let Some(estimate) = saved.estimate {
             let lost_s = (time_s - estimate.time_s).max(0.0);
