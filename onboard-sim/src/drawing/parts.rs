@@ -6,7 +6,7 @@ use flight::vehicle::fins::{PITCH, YAW};
 use flight::vehicle::mission::Mission;
 use serde::Deserialize;
 
-use super::solid::{Section, Solid, turned};
+use super::solid::{Section, Solid};
 
 /// Slices of a piece whose section changes along the axis.
 const SLICES: u32 = 24;
@@ -151,11 +151,11 @@ pub(super) fn of_mission(mission: &Mission, listed: bool) -> Vec<Piece> {
     }
     let (legs, skin_m) = (&airframe.legs, radius_m + LEG_M);
     let top_m = (legs.foot_station_m + legs.foot_radius_m - skin_m).min(closed_m[0]);
-    for leg in (0..4).filter(|_| !listed) {
+    for (leg, [y, z]) in flight::vehicle::airframe::LEGS_AT.into_iter().enumerate().filter(|_| !listed) {
         let solids = sliced([legs.foot_station_m, top_m], SLICES, |low_m, high_m| {
             let share = (f64::midpoint(low_m, high_m) - legs.foot_station_m) / (top_m - legs.foot_station_m);
             let at_m = legs.foot_radius_m + share * (skin_m - legs.foot_radius_m);
-            Section::disc(turned([at_m, 0.0], (45.0 + 90.0 * f64::from(leg)).to_radians()), LEG_M / 2.0)
+            Section::disc([y * at_m, z * at_m], LEG_M / 2.0)
         });
         add(format!("Leg {}", leg + 1), solids);
     }

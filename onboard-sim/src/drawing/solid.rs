@@ -25,7 +25,7 @@ pub struct Solid {
 }
 
 /// A point turned about the axis, from the y axis towards the z axis.
-pub(super) fn turned([y, z]: [f64; 2], angle_rad: f64) -> [f64; 2] {
+fn turned([y, z]: [f64; 2], angle_rad: f64) -> [f64; 2] {
     let (sin, cos) = libm::sincos(angle_rad);
     [y * cos - z * sin, y * sin + z * cos]
 }

@@ -1,6 +1,7 @@
 //! The drawing of a vehicle, and that the parts of mk3 fit into it.
 #![expect(clippy::unwrap_used, reason = "a test that cannot be set up fails")]
 
+use flight::vehicle::airframe::LEGS_AT;
 use flight::vehicle::mission::Mission;
 use flight::vehicles::mission::{BUILTIN, builtin};
 use onboard_sim::drawing::{Drawing, MK3, read};
@@ -53,6 +54,23 @@ fn the_sensors_of_mk3_are_in_their_parts() {
     }
     // Fins of carbon hide the sky from what is below their hinges.
     assert!(sensors.gnss_station_m.unwrap() > mission("mk3").airframe.fins.station_m + 0.01);
+}
+
+/// The feet of the list are as far from the axis as those of the model, and between them.
+#[test]
+fn the_feet_of_mk3_stand_between_those_of_the_model() {
+    let legs = mission("mk3").airframe.legs;
+    let feet = MK3.lines().filter(|line| line.starts_with("Leg") && line.contains(",disc,"));
+    let mut found = 0;
+    for foot in feet {
+        let numbers: Vec<f64> = foot.split(',').filter_map(|cell| cell.parse().ok()).collect();
+        let [from_mm, _, y_mm, z_mm, ..] = numbers[..] else { panic!("{foot}") };
+        assert!((from_mm - 1e3 * legs.foot_station_m).abs() < 0.1, "{foot}");
+        let between = 1e3 * legs.foot_radius_m * std::f64::consts::FRAC_1_SQRT_2;
+        assert!((y_mm.abs() - between).abs() < 0.1 && (z_mm.abs() - between).abs() < 0.1, "{foot}");
+        found += 1;
+    }
+    assert_eq!(found, LEGS_AT.len());
 }
 
 /// Each part in the list of masses is drawn about the station that its mass has there.

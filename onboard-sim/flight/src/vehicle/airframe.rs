@@ -367,7 +367,10 @@ impl Servo {
     }
 }
 
-/// Four legs, 90 degrees apart. Each has a spring and a damper along the vertical, and a foot with
+/// Directions of the four legs from the axis, along body y and z.
+pub const LEGS_AT: [[f64; 2]; 4] = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+
+/// Four legs ([`LEGS_AT`]). Each has a spring and a damper along the vertical, and a foot with
 /// friction.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

@@ -13,7 +13,7 @@
 //! of contact dynamics modelling", Mechanism and Machine Theory 37, 2002.
 
 use flight::rules::verdict::Touchdown;
-use flight::vehicle::airframe::{Airframe, Crush};
+use flight::vehicle::airframe::{Airframe, Crush, LEGS_AT};
 use flight::vehicle::rigid::RigidState;
 use nalgebra::{Rotation3, Vector3};
 
@@ -122,9 +122,9 @@ impl Ground {
     pub(crate) fn new(airframe: &Airframe, rise: [f64; 2]) -> Self {
         let (legs, body) = (&airframe.legs, &airframe.body);
         let upwards = Vector3::new(-rise[0], -rise[1], 1.0);
-        let around = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)];
+        // The hull's rims are touched in the same directions.
         let ring = |station_m: f64, radius_m: f64| {
-            around.map(|(y, z)| Vector3::new(station_m, radius_m * y, radius_m * z))
+            LEGS_AT.map(|[y, z]| Vector3::new(station_m, radius_m * y, radius_m * z))
         };
         let (tail, nose) = (ring(0.0, 0.5 * body.diameter_m), ring(body.length_m, 0.5 * body.diameter_m));
         Self {
