@@ -314,8 +314,8 @@ impl Vehicle {
         Some(sample).filter(|sample| sample.value.is_finite())
     }
 
-    /// Wind towards north and east, m/s; `None` before it is estimated, and once the parachute, which
-    /// the estimator does not model, is out.
+    /// Wind towards north and east, m/s; `None` before it is estimated, and once the parachute is
+    /// out, which the estimator does not model.
     pub fn wind_m_s(&self) -> Option<Sample<[f64; 2]>> {
         let of = |d: &TD_DESCENT_DATA| [f64::from(d.wind_x_m_s), f64::from(d.wind_y_m_s)];
         let wind = self.descent().filter(|d| d.value.chute == TdChute::TD_CHUTE_STOWED)?.map(of);
