@@ -195,7 +195,7 @@ pub struct StationArgs {
     pub start: Option<StartPoint>,
 
     /// Demonstration: seed of its dispersions. Default: 1.
-    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", help_heading = "Demonstration")]
+    #[arg(long, value_name = "NUMBER", conflicts_with = "connect", value_parser = in_range(0..=u64::MAX), help_heading = "Demonstration")]
     pub seed: Option<u64>,
 
     /// Demonstration: speed of simulated time, a factor or `max`. Default: 1.

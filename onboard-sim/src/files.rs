@@ -195,7 +195,8 @@ fn unfinished(beside: &Path) -> io::Result<NamedTempFile> {
     // only.
     unfinished.prefix(".unfinished-").permissions(Permissions::from_mode(0o666));
     let folder = beside.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    unfinished.tempfile_in(folder)
+    // The error of a missing folder does not name the temporary file.
+    folder.metadata().and_then(|_| unfinished.tempfile_in(folder))
 }
 
 #[cfg(test)]

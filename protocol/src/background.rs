@@ -64,9 +64,8 @@ impl<T: Ord, O> Shared<T, O> {
         self.changed.notify_all();
         let idle = |queue: &mut Queue<T, O>| queue.jobs.is_empty() && !queue.ends;
         let mut queue = self.changed.wait_while(queue, idle).unwrap_or_else(PoisonError::into_inner);
-        let job = queue.jobs.pop_first().map(|(_, job)| job);
-        queue.runs = job.is_some();
-        job
+        queue.runs = !queue.jobs.is_empty();
+        queue.jobs.pop_first().map(|(_, job)| job)
     }
 }
 

@@ -140,13 +140,13 @@ fn harmless(text: &[u8]) -> String {
 /// Writes a note to standard error, unless --quiet is given.
 pub(crate) fn print_note(text: &str) {
     if !is_quiet() {
-        print_error(text);
+        let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
     }
 }
 
-/// Writes a line to standard error; a closed standard error is ignored.
+/// Writes an error to standard error; a closed standard error is ignored.
 pub fn print_error(text: &str) {
-    let _ = writeln!(io::stderr(), "replay: {}", harmless(text.as_bytes()));
+    let _ = writeln!(io::stderr(), "error: {}", harmless(text.as_bytes()));
 }
 
 /// An input file, and the log to write from it.

@@ -73,16 +73,14 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("fin 2", "deg", 1, |m, _| fin(&m.vehicle, 1)),
     quantity("fin 3", "deg", 1, |m, _| fin(&m.vehicle, 2)),
     quantity("fin 4", "deg", 1, |m, _| fin(&m.vehicle, 3)),
-    quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m).filter(is_estimated)),
+    quantity("apogee", "m", 0, |m, _| m.vehicle.of_descent(|d| d.apogee_m).filter(|of| of.value != 0.0)),
     quantity("time to apogee", "s", 1, |m, _| m.vehicle.of_descent(|d| d.time_to_apogee_s)),
     quantity("band low", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_low_m)),
     quantity("band high", "m", 1, |m, _| m.vehicle.of_descent(|d| d.band_high_m)),
     quantity("ignition height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.chosen_height_m)),
     quantity("commit height", "m", 1, |m, _| m.vehicle.of_descent(|d| d.commit_height_m)),
     quantity("time to ignition", "s", 1, |m, now| m.vehicle.ignition_in_s(now)),
-    quantity("wind", "m/s", 1, |m, _| {
-        Some(m.vehicle.wind_m_s()?.map(|[north, east]| libm::hypot(*north, *east)))
-    }),
+    quantity("wind", "m/s", 1, |m, _| Some(m.vehicle.wind_m_s()?.map(|[x, y]| libm::hypot(*x, *y)))),
     quantity("touchdown north", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_x_m)),
     quantity("touchdown east", "m", 1, |m, _| m.vehicle.of_touchdown(|d| d.touchdown_y_m)),
     quantity("drag", "x", 3, |m, _| m.vehicle.of_descent(|d| d.drag_scale)),
@@ -112,11 +110,6 @@ pub static ALL: [Quantity; COUNT] = [
     quantity("radio margin", "dB", 1, |m, now| Some(Sample::new(margin_db(m.link.radio(now)?)?, now))),
     quantity("link loss", "%", 1, |m, now| m.link.loss(now).map(|loss| Sample::new(100.0 * loss, now))),
 ];
-
-/// Exactly zero is sent for what is not estimated.
-fn is_estimated(sample: &Sample<f64>) -> bool {
-    sample.value != 0.0
-}
 
 fn link(model: &Model, now: Duration, pick: fn(&LinkFigures) -> f64) -> Option<Sample<f64>> {
     model.link.last_frame_at.map(|_| Sample::new(pick(&model.link.stats.figures(now)), now))

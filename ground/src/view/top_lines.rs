@@ -6,7 +6,6 @@ use std::time::Duration;
 use protocol::command::result_words;
 use protocol::dialect::TdPhase;
 use protocol::identity::VEHICLE;
-use protocol::log::record::EventLevel;
 use ratatui::Frame;
 use ratatui::layout::Constraint::{Fill, Length};
 use ratatui::layout::Rect;
@@ -135,13 +134,10 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let is_pad = model.page() == Page::Pad;
     let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
     let event_words = || {
-        let fresh = |(event, _): &(&Event, _)| now.saturating_sub(event.at) < EVENT_SHOWN;
-        // Of an error the alarm stands in the last rows.
-        let repeats = |event: &Event| event.level == EventLevel::Error && model.alarms.unacknowledged() > 0;
+        // What an alarm states in the last rows is not repeated.
+        let is_calm = model.alarms.unacknowledged() == 0;
+        let fresh = |(event, _): &(&Event, _)| is_calm && now.saturating_sub(event.at) < EVENT_SHOWN;
         let (event, text) = lists::crew_events(model).next().filter(fresh)?;
-        if repeats(event) {
-            return None;
-        }
         Some(format!(" {}{text}", event.mark().trim_start()))
     };
     // After an acknowledged abort the next event matters.

@@ -25,7 +25,7 @@ use sim::wire::fly::{FlightEnd, FlightSummary, FlyOptions, OnTheWire, Speed, fly
 use sim::wire::vehicle::{RocketFlight, VehicleEvent};
 use tokio::sync::watch;
 
-use super::{WindsFile, in_wind, logging, notify, recipe};
+use super::{WINDS_M_S, WindsFile, in_wind, logging, notify, recipe};
 
 #[derive(Args)]
 #[command(
@@ -88,7 +88,7 @@ pub(crate) struct FlyArguments {
     #[arg(long, default_value = "field", value_name = "NAME|FILE")]
     dispersion: String,
     /// Mean wind 10 m above the ground, m/s, instead of the set's.
-    #[arg(long, value_name = "M_S", conflicts_with = "winds_file")]
+    #[arg(long, value_name = "M_S", conflicts_with = "winds_file", value_parser = in_range(WINDS_M_S))]
     wind: Option<f64>,
     #[command(flatten)]
     winds_aloft: WindsFile,

@@ -51,6 +51,9 @@ impl WindsFile {
     }
 }
 
+/// Mean winds that can be given, m/s.
+const WINDS_M_S: std::ops::RangeInclusive<f64> = 0.0..=30.0;
+
 /// Mean winds to compare.
 #[derive(Args)]
 pub(crate) struct MeanWinds {
@@ -60,6 +63,7 @@ pub(crate) struct MeanWinds {
         conflicts_with = "winds_file",
         value_delimiter = ',',
         default_value = "0,3,6,8.9",
+        value_parser = in_range(WINDS_M_S),
         value_name = "M/S,..."
     )]
     winds_m_s: Vec<f64>,
@@ -150,8 +154,6 @@ fn recipe(mission_name: &str, start: Option<StartPoint>, set: &str, seed: u64) -
 /// The same flights in another mean wind, m/s. The log stores the text of the set, and a replay
 /// draws from it again.
 fn in_wind(recipe: &Recipe, wind_m_s: f64) -> anyhow::Result<Recipe> {
-    const MOST_M_S: f64 = 30.0;
-    anyhow::ensure!((0.0..=MOST_M_S).contains(&wind_m_s), "--wind {wind_m_s}: must be 0 to {MOST_M_S} m/s");
     with_set_value(recipe, "wind_m_s", Array::from_iter([wind_m_s; 2]), &format!("{wind_m_s} m/s of wind"))
 }
 

@@ -76,7 +76,10 @@ fn a_folder_without_motors_and_a_wrong_value_are_named() {
     for (arguments, words) in [
         (["check", "mk3", "--from", "no.eng"], "no.eng: cannot be read"),
         (["check", "mk3", "--from", "list.json"], "list.json: not a list of motors"),
-        (["card", "--wind", "3,40", "--seed=1"], "--wind 40: must be 0 to 30 m/s"),
+        (
+            ["card", "--wind", "3,40", "--seed=1"],
+            "'40' for '--wind <M/S,...>': must be a number from 0 to 30",
+        ),
         (["card", "--wind-from", "400", "--seed=1"], "`400` is not a direction of 0 to 360 degrees"),
         (["fly", "--speed", "0", "--seed=1"], "speed `0`: must be `max` or a factor"),
     ] {

@@ -113,7 +113,7 @@ const TABLE: [Row; 16] = [
     ),
     row(
         "report {log} --out -",
-        (0, &["STANDS UNDAMAGED", "{mission}", "Place from above", "!NaN"]),
+        (0, &["STANDS UNDAMAGED", "{mission}", "Place, north up", "!NaN"]),
         (0, &["ABORTED", "{mission}", "abort of the crew", "!NaN"]),
         (0, &["REFUSED: controller warm", "{mission}", "!NaN"]),
     ),

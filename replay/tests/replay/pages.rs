@@ -64,7 +64,7 @@ fn the_report_states_the_verdict_first_and_then_why() {
         let page = page_of(log);
         let order = "STANDS UNDAMAGED|Worst of the legs' limits: |Touchdown at T+|<a href=\"geo:35.34|Findings, causes first|\
             <th>limits of the legs</th>|<th>the paper's Table 2</th>|Height over the whole flight, m|\
-            Place from above, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
+            Place, north up, m|fence 120 m|>planned</span>|The same closer, m|<td>ignition</td>|\
             <td>touchdown</td>|Inferred at the end: impulse |\
             Path from the south, m|>later plans</span>|>plan at ignition</span>|>nose</span>|>flown</span>|\
             Path from the east, m|Path from above, m|Level speed, m/s|Rotation rate, deg/s|Gimbal pitch, deg|\
@@ -189,9 +189,9 @@ fn regress_the_picture_of_a_report(page: &str) {
 /// pictures of the place.
 #[test]
 fn the_report_of_a_flight_from_the_pad_shows_the_ascent() {
-    let mut recipe = Flown::built_in("mk2", "field").unwrap();
-    recipe.mission_toml = toml_starting_at(&recipe.mission_toml, "mk2", StartPoint::Pad).unwrap();
-    recipe.mission = flight::vehicles::mission::from_toml(&recipe.mission_toml, "mk2").unwrap();
+    let mut recipe = Flown::built_in("mk3", "field").unwrap();
+    recipe.mission_toml = toml_starting_at(&recipe.mission_toml, "mk3", StartPoint::Pad).unwrap();
+    recipe.mission = flight::vehicles::mission::from_toml(&recipe.mission_toml, "mk3").unwrap();
     let page = page_of(&fly_recipe(&recipe).log);
     let moments = ["lift-off", "burnout", "apogee", "ignition", "thrust", "touchdown"];
     let cells = moments.map(|moment| format!("<td>{moment}</td>"));

@@ -52,18 +52,15 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     };
     if Room::of(frame.area()) == Room::Small {
         let side = Length(if is_silent(&model.vehicle, now) { LOST_COLUMNS } else { SIDE_COLUMNS });
-        let (left, side) = if burns {
-            let [left, side, right] = columns(area, [Fill(1), side, Length(LIMIT_COLUMNS)]);
-            let [limits, below] = rows(right, [Length(LIMIT_ROWS), Fill(1)]);
+        let shares = if burns { [Fill(1), Length(LIMIT_COLUMNS), side] } else { [Fill(5), Fill(3), side] };
+        let [left, place, side] = columns(area, shares);
+        if burns {
+            let [limits, below] = rows(place, [Length(LIMIT_ROWS), Fill(1)]);
             bars::draw_limits(model, theme, now, frame, limits);
-            let lines = values(model, theme, now, &["tilt", "turn rate", "horizontal speed"]);
-            table("flight", &lines, theme, frame, below);
-            (left, side)
+            table("flight", &values(model, theme, now, &VALUES[..3]), theme, frame, below);
         } else {
-            let [left, place, side] = columns(area, [Fill(5), Fill(3), side]);
             map(FROM_ABOVE, model, theme, now, frame, place);
-            (left, side)
-        };
+        }
         height(model, theme, now, frame, left);
         vehicle(model, &[Side::South], theme, now, frame, side);
         return area;

@@ -48,11 +48,12 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     // The burn fills the picture, and its last metres most: they decide.
     let burns = vehicle.phase_now().is_some_and(is_burning) && until == now;
     let ignited_s = burn_at.map_or(present_s, |(burn_s, _)| burn_s.min(present_s));
-    let present_m = vehicle.height_m().filter(|_| burns).map_or(f64::INFINITY, |height| height.value);
-    let zoom_m = BURN_TOPS_M.into_iter().find(|top_m| present_m < 0.9 * top_m).unwrap_or(f64::INFINITY);
+    let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
+    let fits = |top_m: &f64| burns && height_m.is_some_and(|height| height.value < 0.9 * top_m);
+    let zoom_m = BURN_TOPS_M.into_iter().find(fits).unwrap_or(f64::INFINITY);
     let heights = Quantity::named("height").map(|height| model.history.trace.values(height, from, until));
     let flown = heights.into_iter().flatten().map(|(at, height_m)| (seconds_since(at, from), height_m));
-    let is_shown = |(at, m): &(f64, f64)| *at >= 0.0 && (!burns || (*at >= ignited_s && *m <= zoom_m));
+    let is_shown = |(at, m): &(f64, f64)| *at >= 0.0 && (!burns || (*at >= ignited_s - 1.0 && *m <= zoom_m));
     let flown: Vec<(f64, f64)> = flown.filter(is_shown).collect();
     let begins_s = flown.first().filter(|_| burns).map_or(0.0, |(at, _)| *at);
     let reached = flown.iter().chain(&to_come).map(|(_, height_m)| *height_m).fold(TOP_MIN_M, f64::max);
@@ -65,17 +66,12 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let length_s = if burns { last_s.max(begins_s + 2.0) } else { length_s };
     let bounds = ([begins_s, length_s], [0.0, top]);
     let plane = scales(bounds, TICKS_APART, "T+ s", theme, frame, area);
-    let height_m = vehicle.height_m().filter(|height| !height.is_stale(now) && vehicle.in_flight());
     let highest = flown.iter().copied().reduce(|best, next| if next.1 > best.1 { next } else { best });
     // From the highest point on, so that neither they nor their names move.
     let since_s = highest.map_or(0.0, |(at, _)| at);
     let lights_m = of(|d| d.chosen_height_m).filter(|_| lights);
-    let lights_at = lights_m.and_then(|lights_m| {
-        let passes = |pair: &&[(f64, f64)]| pair[0].1 > lights_m && pair[1].1 <= lights_m;
-        let [(before_s, before_m), (after_s, after_m)] = to_come.windows(2).find(passes)?.try_into().ok()?;
-        let share = (before_m - lights_m) / (before_m - after_m);
-        Some((before_s + share * (after_s - before_s), lights_m))
-    });
+    // The vehicle's own time, as in the large number and on the time axis.
+    let lights_at = vehicle.ignition_in_s(now).zip(lights_m).map(|(left, m)| (present_s + left.value, m));
     // The lines begin before it, with room for their names.
     let since_s = lights_at.map_or(since_s, |(at, _)| since_s.max(at - 0.2 * length_s));
     let good = theme.style(TextRole::Good);
@@ -112,8 +108,7 @@ pub fn draw_height(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
     let rises = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_BOOST | TdPhase::TD_PHASE_COAST));
     let top = vehicle.events.of(TdPhase::TD_PHASE_DEPLOY).filter(|(at, _)| *at > 0.0);
     let labels = [
-        // Its time is the vehicle's, beside the large number and on the time axis.
-        lights_at.map(|at| ((since_s, at.1), vec![format!("ignition {} m", whole(at.1))], predicted)),
+        lights_at.map(|at| ((since_s, at.1), words("ignition ", at), predicted)),
         band.filter(|_| lights_at.is_none()).map(|(low_m, high_m)| {
             let words = format!("band {}..{}", whole(low_m), whole(high_m));
             ((since_s, f64::midpoint(low_m, high_m)), vec![words], good)

@@ -21,7 +21,7 @@ const STAGES: [Stage; 4] = [
 ];
 
 /// The title of the map.
-const COMPLETE: &str = "Place from above, m";
+const COMPLETE: &str = "Place, north up, m";
 /// How far from the pad a field is drawn in the log of a station, which has no fence, m.
 const FIELD_REACH_M: f64 = 500.0;
 
