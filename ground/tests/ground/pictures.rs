@@ -449,6 +449,8 @@ fn recorded(mut enough: impl FnMut(&Moment) -> bool) -> Moment {
     let reader = recording.reader().expect("the recorded flight");
     let mut rig = Rig::new(settings(false, true));
     rig.speaks = false;
+    // As the first command of README.md shows it.
+    rig.model.settings.demonstration = true;
     let status = TD_FLIGHT_STATUS_DATA::default();
     let mut moment = Moment { rig, phase: TdPhase::TD_PHASE_SAFE, status, height_m: f64::INFINITY };
     for event in reader {
