@@ -1,11 +1,11 @@
 //! Draws flights with one random fault each, and counts how often the first finding names the
 //! broken part.
 //!
-//! `cargo run --release -p replay --example blind_draw -- FLIGHTS SEED [all]`
+//! `cargo run --release -p replay --example blind_draw -- FLIGHTS SEED [all|healthy]`
 //!
 //! A flight that lands undamaged without a finding is counted apart: its fault had no effect that
 //! anybody has to explain. With `all` every flight is printed, otherwise those with another first
-//! finding.
+//! finding. With `healthy` no part is broken, and the flights that stand with a finding are counted.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -81,6 +81,9 @@ const KINDS: [Kind; 44] = [
 
 const SURFACES: [&str; 6] = ["gimbal pitch", "gimbal yaw", "fin 1", "fin 2", "fin 3", "fin 4"];
 
+/// The kind of a flight without a fault.
+const HEALTHY: &str = "healthy";
+
 /// A drawn flight.
 struct Drawn {
     mission: &'static str,
@@ -127,7 +130,7 @@ fn flown(drawn: &Drawn) -> anyhow::Result<(bool, Vec<Finding>)> {
     let recipe = Recipe::built_in(drawn.mission, "real")?;
     let recipe = if recipe.mission.launch.is_some() { recipe.starting_at(StartPoint::Pad)? } else { recipe };
     let is_battery = drawn.kind == "battery";
-    let faults = if is_battery { Vec::new() } else { vec![drawn.fault.parse()?] };
+    let faults = if is_battery || drawn.kind == HEALTHY { Vec::new() } else { vec![drawn.fault.parse()?] };
     let mut flight = Sortie::new(&Recipe { seed: drawn.seed, faults, ..recipe }, 0)?;
     if is_battery {
         flight.set_battery(0.0);
@@ -141,6 +144,25 @@ fn flown(drawn: &Drawn) -> anyhow::Result<(bool, Vec<Finding>)> {
     Ok((flight.outcome().landing.stands, findings.found()))
 }
 
+/// Prints the healthy flights that have a finding, and how many of them stand.
+fn print_healthy(draws: &[Drawn], results: Vec<anyhow::Result<(bool, Vec<Finding>)>>) -> anyhow::Result<()> {
+    let (mut standing, mut false_findings) = (0, 0);
+    let mut output = std::io::stdout().lock();
+    for (Drawn { mission, seed, .. }, result) in draws.iter().zip(results) {
+        let (stands, found) = result?;
+        standing += u64::from(stands);
+        false_findings += u64::from(stands && !found.is_empty());
+        if !found.is_empty() {
+            let words: Vec<String> = found.iter().map(Finding::words).collect();
+            let verdict = if stands { "stands" } else { "damaged" };
+            writeln!(output, "{mission} seed {seed} {verdict}: {}", words.join(" | "))?;
+        }
+    }
+    let share = Share::new(false_findings, standing);
+    writeln!(output, "healthy flights that stand with a finding: {share} (95 % interval)")?;
+    Ok(())
+}
+
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |place: usize| -> anyhow::Result<u64> {
@@ -148,9 +170,16 @@ fn main() -> anyhow::Result<()> {
         text.parse().with_context(|| format!("{text}: not a number"))
     };
     let (flights, seed) = (number(0)?, number(1)?);
-    let all = arguments.get(2).is_some();
-    let draws: Vec<Drawn> = (0..flights).map(|flight| drawn(seed + flight)).collect();
+    let all = arguments.get(2).is_some_and(|mode| mode == "all");
+    let is_healthy = arguments.get(2).is_some_and(|mode| mode == HEALTHY);
+    let mut draws: Vec<Drawn> = (0..flights).map(|flight| drawn(seed + flight)).collect();
+    if is_healthy {
+        draws.iter_mut().for_each(|drawn| (drawn.kind, drawn.fault) = (HEALTHY, HEALTHY.to_owned()));
+    }
     let results = threads(None)?.install(|| in_parallel(&draws, flown, &|_| {}));
+    if is_healthy {
+        return print_healthy(&draws, results);
+    }
     let (mut named, mut without_effect, mut silent) = (0, 0, 0);
     let mut by_kind: BTreeMap<&str, [u64; 2]> = BTreeMap::new();
     let mut output = std::io::stdout().lock();
