@@ -32,6 +32,8 @@ impl Places {
         let of_page = [
             ("0.0.0.0:14550", station.clone()),
             ("192.168.1.20:14550", station),
+            // Any free port.
+            ("127.0.0.1:8765", "127.0.0.1:0".to_owned()),
             ("serial:/dev/ttyUSB0:57600", self.radio.near_link()),
             ("serial:/dev/ttyUSB1:57600", self.radio.far_link()),
         ];
@@ -68,7 +70,7 @@ impl Places {
 }
 
 /// How each line of the page begins; the tests below run them.
-const LINES: [&str; 20] = [
+const LINES: [&str; 21] = [
     "ground daemon --connect",
     "ground attach ",
     "ground attach --watch",
@@ -78,6 +80,7 @@ const LINES: [&str; 20] = [
     "onboard-sim fly --start pad --mavlink udpout",
     "onboard-sim fly --start pad --mavlink serial",
     "ground --connect udpin",
+    "ground --connect udpin:0.0.0.0:14550 --foxglove",
     "ground --connect serial",
     "onboard-sim keygen flight.key",
     "onboard-sim fly --start pad --key",
@@ -129,12 +132,13 @@ fn a_recorded_flight_is_shown_as_on_the_crews_page() {
     drop(places.screen(folder.path(), "ground --replay", "REPLAY"));
 }
 
-/// One vehicle after the other on the three links of the page: UDP, a radio, and UDP that is
-/// signed.
+/// One vehicle after the other on the links of the page: UDP, the same with live values for
+/// Foxglove, a radio, and UDP that is signed.
 #[test]
 fn the_links_of_the_crews_page_join_vehicle_and_station() {
     for (begins, meets) in [
         ("onboard-sim fly --start pad --mavlink udpout", "ground --connect udpin"),
+        ("onboard-sim fly --start pad --mavlink udpout", "ground --connect udpin:0.0.0.0:14550 --foxglove"),
         ("onboard-sim fly --start pad --mavlink serial", "ground --connect serial"),
         ("onboard-sim fly --start pad --key", "ground --key flight.key --connect"),
     ] {

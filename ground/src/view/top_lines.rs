@@ -134,9 +134,7 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     let is_pad = model.page() == Page::Pad;
     let ready = || readiness(model, now).filter(|_| !is_pad).map(|(words, _)| format!(" {words}"));
     let event_words = || {
-        // What an alarm states in the last rows is not repeated.
-        let is_calm = model.alarms.unacknowledged() == 0;
-        let fresh = |(event, _): &(&Event, _)| is_calm && now.saturating_sub(event.at) < EVENT_SHOWN;
+        let fresh = |(event, _): &(&Event, _)| now.saturating_sub(event.at) < EVENT_SHOWN;
         let (event, text) = lists::crew_events(model).next().filter(fresh)?;
         Some(format!(" {}{text}", event.mark().trim_start()))
     };
