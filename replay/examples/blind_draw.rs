@@ -5,7 +5,8 @@
 //!
 //! A flight that lands undamaged without a finding is counted apart: its fault had no effect that
 //! anybody has to explain. With `all` every flight is printed, otherwise those with another first
-//! finding. With `healthy` no part is broken, and the flights that stand with a finding are counted.
+//! finding. With `healthy` no part is broken, and the flights that stand with a finding are
+//! counted.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;

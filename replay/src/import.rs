@@ -71,7 +71,9 @@ pub fn import(file: &Path, output: &Path) -> Result<Imported> {
     let Track { mut samples, texts } = track.with_context(|| name.to_string())?;
     samples.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     let first = samples.first().with_context(|| format!("{name}: no sample with a position"))?.clone();
-    samples.iter_mut().for_each(|sample| sample.time_s -= first.time_s);
+    for sample in &mut samples {
+        sample.time_s -= first.time_s;
+    }
     let counted: [fn(&mut Telemetry) -> &mut Option<f64>; 3] =
         [|sample| &mut sample.north_m, |sample| &mut sample.east_m, |sample| &mut sample.altitude_m];
     for value in counted {
