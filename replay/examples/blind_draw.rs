@@ -175,7 +175,9 @@ fn main() -> anyhow::Result<()> {
     let is_healthy = arguments.get(2).is_some_and(|mode| mode == HEALTHY);
     let mut draws: Vec<Drawn> = (0..flights).map(|flight| drawn(seed + flight)).collect();
     if is_healthy {
-        draws.iter_mut().for_each(|drawn| (drawn.kind, drawn.fault) = (HEALTHY, HEALTHY.to_owned()));
+        for drawn in &mut draws {
+            (drawn.kind, drawn.fault) = (HEALTHY, HEALTHY.to_owned());
+        }
     }
     let results = threads(None)?.install(|| in_parallel(&draws, flown, &|_| {}));
     if is_healthy {
