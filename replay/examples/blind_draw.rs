@@ -5,7 +5,8 @@
 //!
 //! A flight that lands undamaged without a finding is counted apart: its fault had no effect that
 //! anybody has to explain. With `all` every flight is printed, otherwise those with another first
-//! finding. With `healthy` no part is broken, and the flights that stand with a finding are counted.
+//! finding. With `healthy` no part is broken, and the flights that stand with a finding are
+//! counted.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -174,7 +175,9 @@ fn main() -> anyhow::Result<()> {
     let is_healthy = arguments.get(2).is_some_and(|mode| mode == HEALTHY);
     let mut draws: Vec<Drawn> = (0..flights).map(|flight| drawn(seed + flight)).collect();
     if is_healthy {
-        draws.iter_mut().for_each(|drawn| (drawn.kind, drawn.fault) = (HEALTHY, HEALTHY.to_owned()));
+        for drawn in &mut draws {
+            (drawn.kind, drawn.fault) = (HEALTHY, HEALTHY.to_owned());
+        }
     }
     let results = threads(None)?.install(|| in_parallel(&draws, flown, &|_| {}));
     if is_healthy {
