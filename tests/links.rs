@@ -61,13 +61,21 @@ fn over_udp_tcp_and_a_radio_at_once_every_frame_is_received_once() {
     let line = SerialLine::new(57_600);
     let folder = tempfile::tempdir().unwrap();
     let links = [&line.near_link(), "udpin:127.0.0.1:0", "tcpin:127.0.0.1:0"];
-    let mut vehicle = Running::start(&mut vehicle(folder.path(), &links));
+    // It stays for a station that a busy machine keeps waiting.
+    let mut vehicle = Running::start(vehicle(folder.path(), &links).arg("--stay"));
     let tcp_link = format!("tcpout:127.0.0.1:{}", vehicle.bound_port(Bound::Tcp));
     let udp_link = vehicle.udp_link();
     let ground = Running::start(&mut auto_ground(folder.path(), &[&line.far_link(), &udp_link, &tcp_link]));
-    let (_, ground) = expect_landing(vehicle, ground);
-    for once in ["ARM acknowledged", "countdown started", "burn-out", "phase IGNITION -> POWERED"] {
+    let ground = ground.wait();
+    vehicle.signal(Signal::SIGTERM);
+    let vehicle = vehicle.wait();
+    assert_eq!((ground.code, vehicle.code), (Some(0), Some(0)), "{}\n{}", ground.output, vehicle.output);
+    for once in ["ARM acknowledged", "phase IGNITION -> POWERED"] {
         assert_eq!(ground.output.matches(once).count(), 1, "{once} in:\n{}", ground.output);
+    }
+    for text in ["countdown started", "burn-out"] {
+        let [sent, received] = [&vehicle, &ground].map(|end| end.output.matches(text).count());
+        assert!(sent > 0 && sent == received, "{text} in:\n{}\n{}", ground.output, vehicle.output);
     }
     let names_the_link = ground.output.contains("acknowledged: accepted, over ");
     assert!(names_the_link, "no link is named with the acknowledgement:\n{}", ground.output);
