@@ -70,13 +70,8 @@ fn over_udp_tcp_and_a_radio_at_once_every_frame_is_received_once() {
     vehicle.signal(Signal::SIGTERM);
     let vehicle = vehicle.wait();
     assert_eq!((ground.code, vehicle.code), (Some(0), Some(0)), "{}\n{}", ground.output, vehicle.output);
-    for once in ["ARM acknowledged", "phase IGNITION -> POWERED"] {
+    for once in ["ARM acknowledged", "countdown started", "burn-out", "phase IGNITION -> POWERED"] {
         assert_eq!(ground.output.matches(once).count(), 1, "{once} in:\n{}", ground.output);
-    }
-    // What waits while a station stands still is in its log only.
-    for text in ["countdown started", "burn-out"] {
-        let [sent, received] = [&vehicle, &ground].map(|end| end.output.matches(text).count());
-        assert!(sent > 0 && received <= sent, "{text} in:\n{}\n{}", ground.output, vehicle.output);
     }
     let names_the_link = ground.output.contains("acknowledged: accepted, over ");
     assert!(names_the_link, "no link is named with the acknowledgement:\n{}", ground.output);

@@ -31,7 +31,7 @@ fn within(megabytes: u32, arguments: &[&str], file: &Path) -> (i32, String) {
     (output.status.code().unwrap(), String::from_utf8(said).unwrap())
 }
 
-/// Five gigabytes, nearly all of them a hole: everything before the hole is used.
+/// Ten gigabytes, nearly all of them a hole: everything before the hole is used.
 #[test]
 fn a_hollow_log_is_used_up_to_its_hole() {
     let directory = tempfile::tempdir().unwrap();
@@ -39,7 +39,7 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     let (at, frames) = COMPLETE.synced[4];
     std::fs::write(&path, &COMPLETE.bytes[..usize::try_from(at).unwrap()]).unwrap();
     let file = std::fs::File::options().write(true).open(&path).unwrap();
-    file.set_len(5 << 30).unwrap();
+    file.set_len(10 << 30).unwrap();
     for (arguments, expected) in [
         (&["info"][..], "type 0, which does not exist".to_owned()),
         (&["verify"], format!("{frames} of {frames} frames identical of the readable part")),
@@ -53,11 +53,11 @@ fn a_hollow_log_is_used_up_to_its_hole() {
     }
     let recovered = directory.path().join("recovered.mcap");
     let recovery = replay::recover::recover(&path, &recovered).unwrap();
-    assert_eq!(recovery.lost[0].bytes, (5 << 30) - at);
+    assert_eq!(recovery.lost[0].bytes, (10 << 30) - at);
     assert_eq!(Recording::open(&recovered).unwrap().frames.len(), frames);
 
     file.set_len(0).unwrap();
-    file.set_len(5 << 30).unwrap();
+    file.set_len(10 << 30).unwrap();
     let (code, said) = within(200, &["info"], &path);
     assert_eq!(code, 1, "{said}");
 }
