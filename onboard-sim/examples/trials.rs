@@ -29,12 +29,13 @@ fn main() -> anyhow::Result<()> {
         let rows = rows.into_iter().collect::<Result<Vec<_>, _>>()?;
         trial.stands = rows.iter().filter(|row| row.stands).count() as u64;
         trial.envelope = rows.iter().filter(|row| row.stands && row.envelope).count() as u64;
-        trial.table_2 = Some(rows.iter().filter(|row| row.stands && row.table_2).count() as u64);
+        let table_2 = rows.iter().filter(|row| row.stands && row.table_2).count() as u64;
+        trial.table_2 = Some(table_2);
         trial.first_m_s = rows[0].touchdown_vertical_m_s.map(|m_s| m_s.to_string()).unwrap_or_default();
-        let Trial { table, row, stands, envelope, table_2, .. } = trial;
+        let Trial { table, row, stands, envelope, .. } = trial;
         writeln!(
             stdout,
-            "{table} {row}: {stands} stand, {envelope} inside the envelope, {table_2:?} Table 2"
+            "{table} {row}: {stands} stand, {envelope} inside the envelope, {table_2} inside Table 2"
         )?;
         // After each row: the rest may be flown another time.
         std::fs::write(PATH, written(&text, &trials)?)?;
