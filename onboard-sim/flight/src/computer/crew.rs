@@ -234,7 +234,7 @@ impl Computer {
                 self.table.report(Severity::Warning, text!("{who} aborts"));
             }
         }
-        let checks = self.arming_checks_by(uplink, true);
+        let checks = self.failing_checks(uplink);
         let start = self.start_point();
         let lifted_off = self.pilot.ascent.has_lifted_off();
         let abort = self.abort_event();

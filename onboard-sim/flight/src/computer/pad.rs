@@ -11,7 +11,7 @@ use crate::estimation::estimator::Measurements;
 use crate::estimation::estimator::alignment::{PadAlignment, PadRecord, PadStart};
 use crate::estimation::sensor_watch::Rests;
 use crate::estimation::spikes::SpikeFilter;
-use crate::rules::arming::{ArmingInput, Checks, Uplink, arming_checks};
+use crate::rules::arming::{ArmingInput, Checks, Uplink, arming_checks, failing_checks};
 use crate::rules::phase::{Event, HoldCause, Phase, StartPoint};
 use crate::text::text;
 use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
@@ -258,18 +258,22 @@ impl Computer {
 
     /// The arming checks with the present values and the best uplink.
     pub fn arming_checks(&self) -> Checks {
-        self.arming_checks_by(self.input.uplink, false)
+        arming_checks(&self.arming, &self.arming_input(self.input.uplink))
     }
 
-    /// The arming checks with the uplink of a station; or only those that fail.
-    pub(super) fn arming_checks_by(&self, uplink: Uplink, failing_only: bool) -> Checks {
+    /// The arming checks that fail, with the uplink of a station.
+    pub(super) fn failing_checks(&self, uplink: Uplink) -> Checks {
+        failing_checks(&self.arming, &self.arming_input(uplink))
+    }
+
+    fn arming_input(&self, uplink: Uplink) -> ArmingInput {
         let locks = &self.table.mode().interlocks;
         let stance = self.stance();
         let (controller_warm, controller_found, predicted_landing) = match &self.rehearsed {
             Some(rehearsed) => (rehearsed.warm, rehearsed.found, rehearsed.landing.clone()),
             None => (false, text!("no rehearsal yet"), None),
         };
-        let input = ArmingInput {
+        ArmingInput {
             pin_out: locks.pin_out,
             abort_latched: locks.abort_latched,
             pad_wait_s: self.table.mode().pad_wait_remaining_s(self.table.time_s),
@@ -292,8 +296,7 @@ impl Computer {
             controller_found,
             predicted_landing,
             uplink,
-        };
-        arming_checks(&self.arming, &input, failing_only)
+        }
     }
 
     /// Evaluates every arming check again. While the vehicle waits, a failure is reported; in the
@@ -304,7 +307,7 @@ impl Computer {
             Phase::PadArmed => true,
             _ => return,
         };
-        let checks = self.arming_checks_by(self.input.uplink, true);
+        let checks = self.failing_checks(self.input.uplink);
         let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s) else { return };
         let held = armed && self.hold(HoldCause::CheckFailed, || why);
         if untold && !held {

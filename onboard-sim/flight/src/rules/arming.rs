@@ -90,53 +90,14 @@ pub struct ArmingInput {
 /// The arming checks.
 pub type Checks = ArrayVec<Check, { 16 + SENSORS.len() }>;
 
-/// Every arming check with its value, in the order in which an operator resolves them; or only
-/// those that fail, which spares the texts of the others.
-pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput, failing_only: bool) -> Checks {
-    let mut list = List { checks: Checks::new(), failing_only };
-    let approachable = !input.abort_latched && input.pad_wait_s.is_none();
-    list.add("abort latch", approachable, || {
-        let found = match input.pad_wait_s.filter(|_| !input.abort_latched) {
-            _ if approachable => text!("clear"),
-            Some(wait_s) => text!("keep away for {wait_s:.0} s"),
-            None => text!("latched: restart to clear it"),
-        };
-        [found, text!("clear")]
-    });
-    list.condition("pin", input.pin_out, "out", "in");
-    let not_passed = if input.is_checking { "a check of the vehicle runs" } else { "not passed" };
-    list.condition("self-test", input.self_test_passed && !input.is_checking, "passed", not_passed);
-    // Before the checks of derived values: the faulty sensor is named, not the value that it
-    // spoils. The defect contains the sensor's name.
-    for (name, defect) in SENSORS.into_iter().zip(&input.sensor_defects) {
-        list.add(name, defect.is_none(), || [defect.unwrap_or_else(|| text!("speaks")), Text::new()]);
-    }
-    list.at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s");
-    list.at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg");
-    list.at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s");
-    list.condition("estimator", input.estimator_converged, "converged", "not converged");
-    list.fins_answering(input);
-    list.condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit");
-    list.condition("log", input.log_running, "running", "not running");
-    list.add("log space", input.log_space_bytes >= limits.log_space_min_bytes, || {
-        let mib = |bytes: u64| bytes >> 20;
-        let required = text!("at least {} MiB", mib(limits.log_space_min_bytes));
-        [text!("{} MiB", mib(input.log_space_bytes)), required]
-    });
-    let rehearsed = || [input.controller_found, text!("a rehearsal that lands")];
-    list.add("controller warm", input.controller_warm, rehearsed);
-    let landing = input.predicted_landing.as_ref();
-    list.add("predicted touchdown", landing.is_some_and(|landing| landing.lands), || {
-        let found = landing.map_or_else(|| text!("no prediction"), |landing| landing.found);
-        [found, text!("inside every touchdown limit")]
-    });
-    list.uplink(input.uplink);
-    list.battery(limits, input.battery_v, input.servo_battery_v);
-    if let Some(height_m) = input.hanging_m {
-        let texts = || [text!("{height_m:.1} m"), text!("at least {LOWEST_ARMED_M} m")];
-        list.add("height below the drone", height_m >= LOWEST_ARMED_M, texts);
-    }
-    list.checks
+/// Every arming check with its value, in the order in which an operator resolves them.
+pub fn arming_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
+    List { checks: Checks::new(), failing_only: false }.filled(limits, input)
+}
+
+/// The arming checks that fail: no text of the others is written.
+pub fn failing_checks(limits: &ArmingLimits, input: &ArmingInput) -> Checks {
+    List { checks: Checks::new(), failing_only: true }.filled(limits, input)
 }
 
 /// The name of the uplink check, the only check that depends on the ground.
@@ -149,6 +110,48 @@ struct List {
 }
 
 impl List {
+    fn filled(mut self, limits: &ArmingLimits, input: &ArmingInput) -> Checks {
+        let not_clear = match input.pad_wait_s.filter(|_| !input.abort_latched) {
+            Some(wait_s) => text!("keep away for {wait_s:.0} s"),
+            None => text!("latched: restart to clear it"),
+        };
+        let is_clear = !input.abort_latched && input.pad_wait_s.is_none();
+        self.condition("abort latch", is_clear, "clear", &not_clear);
+        self.condition("pin", input.pin_out, "out", "in");
+        let not_passed = if input.is_checking { "a check of the vehicle runs" } else { "not passed" };
+        self.condition("self-test", input.self_test_passed && !input.is_checking, "passed", not_passed);
+        // Before the checks of derived values: the faulty sensor is named, not the value that it
+        // spoils. The defect contains the sensor's name.
+        for (name, defect) in SENSORS.into_iter().zip(&input.sensor_defects) {
+            self.add(name, defect.is_none(), || [defect.unwrap_or_else(|| text!("speaks")), Text::new()]);
+        }
+        self.at_most("rotation", input.rotation_rad_s.to_degrees(), limits.rotation_max_deg_s, "deg/s");
+        self.at_most("tilt from vertical", input.tilt_rad.to_degrees(), limits.tilt_max_deg, "deg");
+        self.at_most("speed", input.speed_m_s, limits.speed_max_m_s, "m/s");
+        self.condition("estimator", input.estimator_converged, "converged", "not converged");
+        self.fins_answering(input);
+        self.condition("igniter continuity", input.igniter_continuity, "closed circuit", "open circuit");
+        self.condition("log", input.log_running, "running", "not running");
+        self.add("log space", input.log_space_bytes >= limits.log_space_min_bytes, || {
+            let required = text!("at least {} MiB", limits.log_space_min_bytes >> 20);
+            [text!("{} MiB", input.log_space_bytes >> 20), required]
+        });
+        let rehearsed = || [input.controller_found, text!("a rehearsal that lands")];
+        self.add("controller warm", input.controller_warm, rehearsed);
+        let landing = input.predicted_landing.as_ref();
+        self.add("predicted touchdown", landing.is_some_and(|landing| landing.lands), || {
+            let found = landing.map_or_else(|| text!("no prediction"), |landing| landing.found);
+            [found, text!("inside every touchdown limit")]
+        });
+        self.uplink(input.uplink);
+        self.battery(limits, input.battery_v, input.servo_battery_v);
+        if let Some(height_m) = input.hanging_m {
+            let texts = || [text!("{height_m:.1} m"), text!("at least {LOWEST_ARMED_M} m")];
+            self.add("height below the drone", height_m >= LOWEST_ARMED_M, texts);
+        }
+        self.checks
+    }
+
     /// Adds a check with the text of the value found and of the value required.
     fn add(&mut self, name: &'static str, passed: bool, texts: impl FnOnce() -> [Text; 2]) {
         if !(passed && self.failing_only) {
@@ -171,11 +174,8 @@ impl List {
     }
 
     fn uplink(&mut self, uplink: Uplink) {
-        let passed = match uplink {
-            Uplink::NotNeeded => true,
-            Uplink::NeverReceived => false,
-            Uplink::Received { age_s } => age_s <= UPLINK_PROVEN_S,
-        };
+        let is_recent = matches!(uplink, Uplink::Received { age_s } if age_s <= UPLINK_PROVEN_S);
+        let passed = uplink == Uplink::NotNeeded || is_recent;
         self.add(UPLINK_CHECK, passed, || {
             let found = match uplink {
                 Uplink::NotNeeded => text!("not needed: the vehicle starts by itself"),
@@ -290,12 +290,12 @@ mod tests {
 
     #[test]
     fn a_ready_vehicle_passes_every_check() {
-        let checks = arming_checks(&ArmingLimits::default(), &ready(), false);
+        let checks = arming_checks(&ArmingLimits::default(), &ready());
         assert!(all_passed(&checks));
         assert_eq!(first_refusal(&checks), None);
         // Without a crew no station is needed.
         let alone = ArmingInput { uplink: Uplink::NotNeeded, ..ready() };
-        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone, false)));
+        assert!(all_passed(&arming_checks(&ArmingLimits::default(), &alone)));
     }
 
     /// A faulty input, and the check that must refuse it.
@@ -386,10 +386,10 @@ mod tests {
         for (expected, spoil) in spoilings {
             let mut input = ready();
             spoil(&mut input);
-            let checks = arming_checks(&ArmingLimits::default(), &input, false);
+            let checks = arming_checks(&ArmingLimits::default(), &input);
             let failing: Vec<_> = checks.iter().filter(|check| !check.passed).cloned().collect();
             assert_eq!(failing.len(), 1, "{expected}");
-            assert_eq!(arming_checks(&ArmingLimits::default(), &input, true)[..], failing);
+            assert_eq!(failing_checks(&ArmingLimits::default(), &input)[..], failing);
             let refusal = first_refusal(&checks).unwrap();
             assert!(refusal.starts_with(expected), "{refusal}");
         }
