@@ -145,13 +145,12 @@ impl Peers {
     }
 
     /// The addresses to send to: the one peer, or all.
-    pub(super) fn receivers(&self, to: Option<Origin>) -> Vec<SocketAddr> {
-        if let (None, Some(network)) = (to, self.network) {
-            return vec![network];
-        }
+    pub(super) fn receivers(&self, to: Option<Origin>) -> impl Iterator<Item = SocketAddr> {
+        let all = self.network.filter(|_| to.is_none());
         let guest = self.guest.map(|(address, _)| address);
         let answered = self.fixed.into_iter().chain(self.proven.iter().map(|peer| peer.address)).chain(guest);
-        answered.filter(|peer| to.is_none_or(|to| to == Origin::Datagram(*peer))).collect()
+        let receives = move |peer: &SocketAddr| to.is_none_or(|to| to == Origin::Datagram(*peer));
+        all.into_iter().chain(answered.filter(move |peer| all.is_none() && receives(peer)))
     }
 
     fn schedule_report(&mut self, now: Duration) {
@@ -209,7 +208,7 @@ mod tests {
     }
 
     fn answered(peers: &Peers) -> Vec<SocketAddr> {
-        peers.receivers(None)
+        peers.receivers(None).collect()
     }
 
     #[test]
