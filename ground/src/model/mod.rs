@@ -176,12 +176,12 @@ const TIMESYNC_STAMPS_MAX: usize = 64;
 /// The longest note, in characters: a line of the smallest terminal with its name.
 pub(crate) const NOTE_MAX: usize = 60;
 
-/// When each periodic action is next due.
+/// When each periodic action was last due.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Due {
-    pub(crate) heartbeat: Duration,
-    pub(crate) timesync: Duration,
-    pub(crate) telemetry_record: Duration,
+    pub(crate) heartbeat: Option<Duration>,
+    pub(crate) timesync: Option<Duration>,
+    pub(crate) telemetry_record: Option<Duration>,
 }
 
 /// The complete state of the ground station.

@@ -84,13 +84,14 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     }
 }
 
-/// Counts from the time that was due, so that late ticks do not lower the rate.
-fn is_due(due: &mut Duration, every: Duration, now: Duration) -> bool {
-    *due = (*due).min(now + every);
-    if now < *due {
+/// Counts from the time that was last due, so that late ticks do not lower the rate, and a shorter
+/// interval is in force at once.
+fn is_due(last: &mut Option<Duration>, every: Duration, now: Duration) -> bool {
+    let due = last.map_or(now, |last| last.min(now) + every);
+    if now < due {
         return false;
     }
-    *due = (*due + every).max(now + every / 2);
+    *last = Some(due.max(now.saturating_sub(every / 2)));
     true
 }
 

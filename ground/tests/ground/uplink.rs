@@ -169,6 +169,19 @@ fn an_armed_vehicle_on_the_pad_gets_ten_heartbeats_a_second() {
     assert!(heartbeats_in(&mut rig, 5.0) <= 6);
 }
 
+/// Otherwise a countdown that starts just before the next slow heartbeat is held for its absence.
+#[test]
+fn a_vehicle_that_is_armed_between_two_heartbeats_gets_the_next_one_at_once() {
+    for tenths in 0..10 {
+        let mut rig = Rig::crewed();
+        rig.run(f64::from(tenths) / 10.0);
+        rig.armed = true;
+        rig.phase = TdPhase::TD_PHASE_PAD_ARMED;
+        rig.heartbeat();
+        assert_eq!(heartbeats_in(&mut rig, 0.1), 1, "{tenths}");
+    }
+}
+
 #[test]
 fn without_a_link_the_loss_is_unknown() {
     let mut rig = Rig::crewed();
