@@ -120,13 +120,17 @@ fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut:
     let mut free_at = now();
     while !cut.load(Ordering::Relaxed) {
         let mut ready = [PollFd::new(from.as_fd(), PollFlags::POLLIN)];
-        // The time limit lets the thread notice that the line was cut.
-        if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) == 0 {
-            continue;
+        // Bytes that wait already have kept the line busy, however late a busy machine runs this thread.
+        if poll(&mut ready, PollTimeout::ZERO).unwrap_or(0) == 0 {
+            // The time limit lets the thread notice that the line was cut.
+            if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) == 0 {
+                continue;
+            }
+            free_at = free_at.max(now());
         }
         let Ok(count @ 1..) = from.read(&mut buffer) else { continue };
         // The line is busy for as long as its speed requires for these bytes.
-        free_at = free_at.max(now()) + byte_time * count as u32;
+        free_at += byte_time * count as u32;
         std::thread::sleep(free_at.saturating_duration_since(now()));
         if !takes_bytes(&to, cut) || to.write_all(&buffer[..count]).is_err() {
             return;

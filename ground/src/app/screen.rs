@@ -1,9 +1,9 @@
 //! The full screen: prepares and restores the terminal, reads its keys, and writes the frames.
 
+use std::collections::VecDeque;
 use std::io;
 use std::io::Write;
 use std::mem::ManuallyDrop;
-use std::pin::Pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,7 +13,7 @@ use std::time::Duration;
 use anyhow::Context as _;
 use crossterm::cursor::Show;
 use crossterm::event::{
-    DisableBracketedPaste, EnableBracketedPaste, Event, EventStream, KeyboardEnhancementFlags,
+    self, DisableBracketedPaste, EnableBracketedPaste, Event, KeyboardEnhancementFlags,
     PopKeyboardEnhancementFlags, PushKeyboardEnhancementFlags,
 };
 use crossterm::terminal::{
@@ -21,10 +21,10 @@ use crossterm::terminal::{
     supports_keyboard_enhancement,
 };
 use crossterm::{execute, queue};
-use futures_util::Stream as _;
 use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
 use rustix::termios::QueueSelector;
+use tokio::sync::mpsc;
 
 use super::answers;
 use super::pace::Pace;
@@ -41,6 +41,8 @@ use crate::view::Theme;
 const TOGETHER_MAX: usize = 1_024;
 /// A paste has ended when nothing has arrived for this long; on a slow line its parts arrive apart.
 const QUIET_FOR: Duration = Duration::from_millis(50);
+/// The thread that reads the events queries so often whether the screen has ended.
+const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(100);
 /// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
 
@@ -65,7 +67,9 @@ pub struct Screen {
     /// [`restore`] does the clean-up.
     terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
-    events: EventStream,
+    events: mpsc::Receiver<VecDeque<Event>>,
+    /// Of the events that arrived together, those that were not passed on yet.
+    arrived: VecDeque<Event>,
     pub theme: Theme,
     bell: bool,
     voice: Option<Voice>,
@@ -91,11 +95,12 @@ impl Screen {
             voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
         let taken = take_terminal().inspect_err(|_| restore());
-        let (terminal, writer) = taken.context("preparing the terminal")?;
+        let (terminal, writer, events) = taken.context("preparing the terminal")?;
         Ok(Self {
             terminal: ManuallyDrop::new(terminal),
             writer,
-            events: EventStream::new(),
+            events,
+            arrived: VecDeque::new(),
             theme: theme(config),
             bell: config.bell.unwrap_or(true),
             voice,
@@ -204,18 +209,24 @@ impl Screen {
             if self.input_ended || keys.len() >= TOGETHER_MAX {
                 break None;
             }
-            match Pin::new(&mut self.events).poll_next(context) {
-                Poll::Pending => break None,
-                Poll::Ready(Some(Ok(Event::Key(event)))) => keys.extend(Key::from_event(&event)),
-                Poll::Ready(Some(Ok(Event::Paste(_)))) => break Some(Msg::Pasted),
+            let Some(event) = self.arrived.pop_front() else {
+                match self.events.poll_recv(context) {
+                    Poll::Pending => break None,
+                    Poll::Ready(Some(events)) => self.arrived = events,
+                    Poll::Ready(None) => {
+                        self.input_ended = true;
+                        break Some(Msg::Terminate(TERMINAL_LOST));
+                    }
+                }
+                continue;
+            };
+            match event {
+                Event::Key(event) => keys.extend(Key::from_event(&event)),
+                Event::Paste(_) => break Some(Msg::Pasted),
                 // Also needed if the size returns to the old one before the next frame: the
                 // terminal has cut its content.
-                Poll::Ready(Some(Ok(Event::Resize(..)))) => self.clear(),
-                Poll::Ready(Some(Ok(_))) => {}
-                Poll::Ready(Some(Err(_)) | None) => {
-                    self.input_ended = true;
-                    break Some(Msg::Terminate(TERMINAL_LOST));
-                }
+                Event::Resize(..) => self.clear(),
+                Event::FocusGained | Event::FocusLost | Event::Mouse(_) => {}
             }
         };
         // Keys first, in their order; any other input is returned by the next call.
@@ -233,6 +244,29 @@ impl Drop for Screen {
     }
 }
 
+/// Reads the terminal's events in a thread until the screen or the terminal ends, and passes on
+/// together what has arrived together. At each turn of the main loop, crossterm's own stream would
+/// try its reader's lock, which a waiting thread holds: that yields the processor several times, each
+/// for as long as a busy machine wants.
+fn read_events() -> io::Result<mpsc::Receiver<VecDeque<Event>>> {
+    let (sender, events) = mpsc::channel(1);
+    in_a_thread("events", move || -> io::Result<()> {
+        while !sender.is_closed() {
+            let mut arrived = VecDeque::new();
+            let mut patience = LOOK_AGAIN_AFTER;
+            while arrived.len() < TOGETHER_MAX && event::poll(patience)? {
+                arrived.push_back(event::read()?);
+                patience = Duration::ZERO;
+            }
+            if !arrived.is_empty() && sender.blocking_send(arrived).is_err() {
+                break;
+            }
+        }
+        Ok(())
+    })?;
+    Ok(events)
+}
+
 /// The theme from the settings, otherwise from the environment.
 fn theme(config: &Config) -> Theme {
     let found = Theme::of_environment(|name| std::env::var(name).ok());
@@ -245,7 +279,9 @@ fn theme(config: &Config) -> Theme {
     Theme { palette, ascii }
 }
 
-fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWriter)> {
+type Taken = (Terminal<DiffBackend<FrameBuffer>>, TerminalWriter, mpsc::Receiver<VecDeque<Event>>);
+
+fn take_terminal() -> io::Result<Taken> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     answers::begin()?;
@@ -258,7 +294,7 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     backend.erases = std::env::var_os("STY").is_none();
     backend.has_true_colour =
         std::env::var("COLORTERM").is_ok_and(|colours| ["truecolor", "24bit"].contains(&colours.as_str()));
-    Ok((Terminal::new(backend)?, writer))
+    Ok((Terminal::new(backend)?, writer, read_events()?))
 }
 
 /// Whether a multiplexer at this end of an SSH session answers instead of the terminal: its answer

@@ -17,13 +17,10 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::LinkAddress;
 
 use super::clock::{Clock, LogTime};
-use crate::model::{EXPIRES_AFTER, LinkReport};
+use crate::model::{EXPIRES_AFTER, LinkReport, STOOD_STILL};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
-/// Time after which the run loop counts as stalled: stopped, swapped out, or asleep with its
-/// computer.
-const STOOD_STILL: Duration = Duration::from_secs(1);
 /// How long after a stall the arriving data have waited.
 const WAITED_FOR: Duration = Duration::from_millis(500);
 /// Number of boots stored for each link.

@@ -99,7 +99,7 @@ impl Transport {
             LinkAddress::UdpOut(remote) => udp::connect(remote, queues).await?,
             LinkAddress::TcpIn(local) => stream::listen_tcp(local, queues).await?,
             LinkAddress::TcpOut(remote) => stream::connect_tcp(remote.clone(), queues),
-            LinkAddress::Serial { path, baud } => stream::open_serial(path.clone(), *baud, queues),
+            LinkAddress::Serial { path, baud } => stream::open_serial(path.clone(), *baud, queues)?,
         }
         let sender = TransportSender { queue, accepted, dropped: Arc::new(AtomicU64::new(0)) };
         Ok(Self { address, received, sender })

@@ -129,8 +129,12 @@ pub(super) async fn read_all(
 
 // Serial lines: opened again when the device comes back.
 
-pub(super) fn open_serial(path: String, baud: u32, queues: Queues) {
-    tokio::spawn(run(Port { path, baud }, queues));
+/// Serves a serial line in a thread of its own: to open it waits for a file system that stalls, and
+/// to read or query it waits for the kernel's worker behind it, on a busy machine for seconds.
+pub(super) fn open_serial(path: String, baud: u32, queues: Queues) -> io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
+    let serve = move || runtime.block_on(run(Port { path, baud }, queues));
+    std::thread::Builder::new().name("serial".to_owned()).spawn(serve).map(drop)
 }
 
 struct Port {
@@ -152,10 +156,7 @@ impl Line for Port {
     }
 
     async fn open(&self) -> Result<SerialStream, String> {
-        // In a thread: a file system that stalls delays opening the device, too.
-        let port = tokio_serial::new(&self.path, self.baud);
-        let opened = tokio::task::spawn_blocking(move || port.open_native_async()).await;
-        opened.map_err(|error| error.to_string())?.map_err(|error| error.to_string())
+        tokio_serial::new(&self.path, self.baud).open_native_async().map_err(|error| error.to_string())
     }
 }
 
