@@ -24,8 +24,8 @@ pub struct DiffBackend<W: Write> {
     pub terminal: CrosstermBackend<W>,
     /// Whether the terminal shows colours of 24 bits.
     pub has_true_colour: bool,
-    /// The rightmost column that was ever drawn. Behind the last one of the terminal the cursor
-    /// stands where it likes.
+    /// The rightmost column that was drawn since the screen was cleared. Behind the last one of the
+    /// terminal the cursor stands where it likes.
     rightmost: u16,
     cursor_is_hidden: bool,
     /// Whether the terminal erases with the last background, as all do but GNU Screen.
@@ -241,11 +241,14 @@ impl<W: Write> Backend for DiffBackend<W> {
     }
 
     fn clear(&mut self) -> io::Result<()> {
-        (self.rightmost, self.cursor_is_hidden) = (0, false);
-        self.terminal.clear()
+        self.clear_region(ClearType::All)
     }
 
+    // ratatui calls this before the first frame of another size.
     fn clear_region(&mut self, clear_type: ClearType) -> io::Result<()> {
+        if clear_type == ClearType::All {
+            (self.rightmost, self.cursor_is_hidden) = (0, false);
+        }
         self.terminal.clear_region(clear_type)
     }
 
@@ -281,6 +284,21 @@ mod tests {
         terminal.draw([(0, 0, &cell)].into_iter()).unwrap();
         let written = String::from_utf8(written).unwrap();
         assert!(written.contains("\x1b[38;2;116;192;255m\x1b[1;1Hx\x1b[m"), "{written:?}");
+    }
+
+    /// Behind a full row of the narrower terminal the cursor's place is not known.
+    #[test]
+    fn a_terminal_that_became_narrower_is_drawn_in_the_right_columns() {
+        let mut cell = Cell::default();
+        cell.set_symbol("x");
+        let mut written = Vec::new();
+        let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
+        terminal.draw([(99, 0, &cell)].into_iter()).unwrap();
+        terminal.clear_region(ClearType::All).unwrap();
+        let full_row = (0..79).map(|column| (column, 0, &cell));
+        terminal.draw(full_row.chain([(18, 1, &cell)])).unwrap();
+        let written = String::from_utf8(written).unwrap();
+        assert!(written.contains("\x1b[2;19Hx"), "{written:?}");
     }
 
     #[test]
