@@ -120,7 +120,8 @@ fn copy_paced(mut from: File, mut to: File, baud: u32, carried: &AtomicU64, cut:
     let mut free_at = now();
     while !cut.load(Ordering::Relaxed) {
         let mut ready = [PollFd::new(from.as_fd(), PollFlags::POLLIN)];
-        // Bytes that wait already have kept the line busy, however late a busy machine runs this thread.
+        // Bytes that wait already have kept the line busy, however late a busy machine runs this
+        // thread.
         if poll(&mut ready, PollTimeout::ZERO).unwrap_or(0) == 0 {
             // The time limit lets the thread notice that the line was cut.
             if poll(&mut ready, PollTimeout::from(50u8)).unwrap_or(0) == 0 {

@@ -246,8 +246,8 @@ impl Drop for Screen {
 
 /// Reads the terminal's events in a thread until the screen or the terminal ends, and passes on
 /// together what has arrived together. At each turn of the main loop, crossterm's own stream would
-/// try its reader's lock, which a waiting thread holds: that yields the processor several times, each
-/// for as long as a busy machine wants.
+/// try its reader's lock, which a waiting thread holds: that yields the processor several times,
+/// each for as long as a busy machine wants.
 fn read_events() -> io::Result<mpsc::Receiver<VecDeque<Event>>> {
     let (sender, events) = mpsc::channel(1);
     in_a_thread("events", move || -> io::Result<()> {

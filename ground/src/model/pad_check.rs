@@ -202,7 +202,8 @@ pub fn rssi_dbm(radio: &RADIO_STATUS_DATA) -> Option<f64> {
     Some(RSSI_ZERO_DBM + f64::from(steps) / STEPS_PER_DB)
 }
 
-/// Time after which a run loop counts as stalled: stopped, swapped out, or asleep with its computer.
+/// Time after which a run loop counts as stalled: stopped, swapped out, or asleep with its
+/// computer.
 pub(crate) const STOOD_STILL: Duration = Duration::from_secs(1);
 
 /// Signal over noise, dB, at the worse end; `None` if the radio does not report it.
