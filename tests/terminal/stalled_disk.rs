@@ -75,13 +75,13 @@ fn hold_disarm_and_abort_leave_in_the_countdown_while_the_disk_stalls() {
     screen.wait_for("every arming check passes");
     stall(&pad);
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.type_by_hand(b"SSTART\r");
+    screen.type_until(b"SSTART\r", " T-");
     screen.wait_for_fact("START", "observed yes");
     screen.type_bytes(b"H\r");
     pad.vehicle.wait_for_line("HOLD: no countdown");
     screen.type_until(b"D\r", " disarmed ");
     screen.type_until(b"AARM\r", " ARMED ");
-    screen.type_by_hand(b"SSTART\r");
+    screen.type_until(b"SSTART\r", " T-");
     pad.vehicle.wait_for_line("countdown started");
     screen.type_bytes(b"\x18\r");
     screen.wait_for_fact("ABORT", "acknowledged ");
