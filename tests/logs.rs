@@ -54,11 +54,11 @@ fn the_same_flight_with_other_functions_of_the_c_library_is_identical_bit_for_bi
 fn a_refused_flight_leaves_no_log() {
     let folder = tempfile::tempdir().unwrap();
     let link = "udpin:127.0.0.1:0";
-    for (refused, code) in [(["--key", "none.key"], 2), (["--mavlink", "udpin:192.0.2.1:5"], 1)] {
+    for refused in [["--key", "none.key"], ["--mavlink", "udpin:192.0.2.1:5"]] {
         let mut command = program(Program::OnboardSim);
         command.args(["fly", "--mavlink", link, "--log", "flight.mcap"]).args(refused);
         let ended = Running::to_end(command.current_dir(folder.path()));
-        assert_eq!(ended.code, Some(code), "{}", ended.output);
+        assert_eq!(ended.code, Some(1), "{}", ended.output);
         assert!(!folder.path().join("flight.mcap").exists(), "{refused:?}: {}", ended.output);
     }
 }

@@ -21,7 +21,7 @@ fn main() -> ExitCode {
         Ok(Ok(exit)) => exit,
         Ok(Err(error)) => {
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
-            Exit::of_error(error.as_ref(), sim::wire::fly::is_wrong_input)
+            Exit::Error
         }
         Err(_panic) => Exit::Error,
     }

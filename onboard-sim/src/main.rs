@@ -121,7 +121,7 @@ fn main() -> ExitCode {
         .unwrap_or_else(|error| {
             // If writing fails here, there is nothing left to do.
             let _ = writeln!(std::io::stderr(), "error: {error:#}");
-            Exit::of_error(error.as_ref(), sim::wire::fly::is_wrong_input)
+            Exit::Error
         })
         .into()
 }

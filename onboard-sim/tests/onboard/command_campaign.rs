@@ -37,8 +37,7 @@ fn a_wrong_request_is_refused_with_the_reason() {
         (&[], "--out"),
     ] {
         let refused = campaign(directory.path(), arguments);
-        assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
-        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+        assert!(!refused.status.success() && stderr(&refused).contains(words), "{}", stderr(&refused));
         assert!(!directory.path().join("x").exists(), "{words}");
     }
     let dark = campaign(directory.path(), &["--only", "0", "--fault", "no-light@0"]);

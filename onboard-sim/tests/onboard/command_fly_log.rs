@@ -13,7 +13,7 @@ fn fly(directory: &Path, log: &str) -> String {
     let program = env!("CARGO_BIN_EXE_onboard-sim");
     let arguments = ["fly", "--log", log, "--key", "missing.key"];
     let output = Command::new(program).current_dir(directory).args(arguments).output().unwrap();
-    assert_eq!(output.status.code(), Some(2));
+    assert_eq!(output.status.code(), Some(1));
     assert!(output.stdout.is_empty());
     let stderr = String::from_utf8(output.stderr).unwrap();
     stderr.split_inclusive('\n').filter(|line| !line.starts_with("error: ")).collect()

@@ -18,7 +18,6 @@ use anyhow::{Context as _, Result, bail, ensure};
 use clap::Args;
 use flight::vehicle::lot::{Burnt, Posterior};
 use flight::vehicle::mission::Mission;
-use flight::vehicles::mission;
 use onboard_sim::progress::Progress;
 use onboard_sim::run::in_parallel;
 use serde::Serialize;
@@ -621,10 +620,7 @@ impl Arguments {
     /// The prediction for the next day from the fits; `flown` is the mission of the first log.
     pub(super) fn learn(&self, fits: &[Fit], flown: Option<String>) -> Result<Learnt> {
         let mission_toml = match (&self.mission, flown) {
-            (Some(name), _) => {
-                let text = text_of(name, mission::BUILTIN, "mission")?;
-                mission::from_toml(&text, name).map(|_| text)?
-            }
+            (Some(name), _) => text_of(name, flight::vehicles::mission::BUILTIN, "mission")?,
             (None, Some(flown)) => flown,
             (None, None) => bail!("--mission is missing: fits do not hold their mission"),
         };

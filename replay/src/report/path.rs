@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Context as _, Result, ensure};
 use flight::vehicles::mission::from_toml;
 use protocol::motion::Degrees;
 use sim::wire::field::pad_of;
@@ -40,7 +40,7 @@ impl FlownPath {
     pub(crate) fn open(file: &Path) -> Result<Self> {
         let (mut info, recording) = recorded(file)?;
         let mission = from_toml(recording.profile_toml()?, "profile.toml")
-            .map_err(|error| anyhow!("{}: {error}", file.display()))?;
+            .with_context(|| file.display().to_string())?;
         let first_ns = info.span.map_or(0, |span| span.first_ns);
         let zero_s = recording.clocks.flight_zero_s.unwrap_or(0.0);
         let flight = Flight::of(recording, &mut info);

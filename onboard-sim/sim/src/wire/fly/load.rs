@@ -1,6 +1,8 @@
 //! Loads a mission, by name or from a file, makes a flight of it, and starts it where there is no
 //! crew.
 
+use std::path::Path;
+
 use crate::dispersion::Dispersion;
 use crate::recipe::Recipe;
 use flight::computer::crew::{Answer, CrewCommand, Request};
@@ -56,8 +58,11 @@ pub fn load_flight(name_or_path: &str) -> Result<RocketFlight, FlyError> {
     let builtin = flight::vehicles::mission::BUILTIN.iter().find(|(name, _)| *name == name_or_path);
     let toml = match builtin {
         Some((_, text)) => (*text).to_owned(),
+        None if !Path::new(name_or_path).exists() => {
+            return Err(FlyError::NoMission { given: name_or_path.to_owned() });
+        }
         None => std::fs::read_to_string(name_or_path)
-            .map_err(|source| FlyError::NoMission { given: name_or_path.to_owned(), source })?,
+            .map_err(|source| FlyError::ReadMission { path: name_or_path.to_owned(), source })?,
     };
     let dispersion =
         (DISPERSION, Dispersion::builtin_toml(DISPERSION).map_err(crate::recipe::RecipeError::from)?);

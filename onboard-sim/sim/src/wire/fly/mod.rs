@@ -7,12 +7,10 @@ mod pace;
 mod recording;
 mod saved_abort;
 
-use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::dispersion::DispersionError;
 use crate::recipe::RecipeError;
 use avionics::board::stream::OnTheAir;
 use flight::computer::FRAME_S;
@@ -20,7 +18,6 @@ use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
 pub use flight::vehicle::mission::StartPoint;
 pub use flight::vehicles::mission::DEFAULT as DEFAULT_MISSION;
-use flight::vehicles::mission::MissionError;
 use protocol::crew_file::{CrewFile, CrewFileError, Mode};
 use protocol::hub::LinkEvent;
 use protocol::key_file::KeyFileError;
@@ -121,19 +118,22 @@ impl LogClock {
     }
 }
 
-/// Whether an error is of a mission or a set of dispersions that is unknown or invalid: wrong usage
-/// of a program.
-pub fn is_wrong_input(cause: &(dyn Error + 'static)) -> bool {
-    let of_recipe = matches!(cause.downcast_ref(), Some(FlyError::Recipe(_)));
-    of_recipe || cause.is::<RecipeError>() || cause.is::<MissionError>() || cause.is::<DispersionError>()
-}
-
 /// Why a flight could not be run.
 #[derive(Debug, thiserror::Error)]
 pub enum FlyError {
-    /// No mission of that name, and no readable file.
-    #[error("no mission `{given}`: not a readable file, and the built-in ones are {}", load::builtin_names())]
-    NoMission { given: String, source: std::io::Error },
+    /// No mission of that name.
+    #[error("no mission `{given}`: not a file, and the built-in ones are {}", load::builtin_names())]
+    NoMission {
+        /// The requested name.
+        given: String,
+    },
+    /// The mission's file cannot be read.
+    #[error("cannot read the mission {path}")]
+    ReadMission {
+        path: String,
+        /// The system's error.
+        source: std::io::Error,
+    },
     /// The mission is wrong.
     #[error(transparent)]
     Recipe(#[from] RecipeError),
