@@ -30,7 +30,7 @@ fn what_cannot_be_run_has_its_code_and_is_named() {
     assert!(output.status.code() == Some(0) && out(&output).contains(protocol::program::EXIT_CODES));
     for (arguments, code, named) in [
         (&["--connect", "tcp:host:1"][..], 2, "udpin:ADDRESS:PORT"),
-        (&["--mission", "no-such"], 2, "no-such"),
+        (&["--mission", "no-such"], 1, "no-such"),
         (&["attach", "--connect", "udpin:127.0.0.1:0"], 2, "--connect"),
         (&["attach", "--auto"], 2, "--auto"),
         (&["status", "--log", "none"], 2, "--log"),
