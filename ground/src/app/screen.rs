@@ -76,8 +76,6 @@ pub struct Screen {
     pub pace: Pace,
     /// Whether the next frame is written completely.
     redraws_all: bool,
-    /// A message that arrived after the keys that are passed on first.
-    waiting: Option<Msg>,
     input_ended: bool,
     query_at: Duration,
     /// The terminal has answered, and [`Self::answers`] has not reported it yet.
@@ -94,8 +92,9 @@ impl Screen {
         let voice =
             voice.with_context(|| format!("voice: {}", config.voice.as_deref().unwrap_or_default()))?;
         restore_before_panic_message();
-        let taken = take_terminal().inspect_err(|_| restore());
-        let (terminal, writer, events) = taken.context("preparing the terminal")?;
+        let taken = take_terminal().and_then(|taken| Ok((taken, read_events()?)));
+        let taken = taken.inspect_err(|_| restore()).context("preparing the terminal");
+        let ((terminal, writer), events) = taken?;
         Ok(Self {
             terminal: ManuallyDrop::new(terminal),
             writer,
@@ -106,7 +105,6 @@ impl Screen {
             voice,
             pace: Pace::new(is_answered_by_another()),
             redraws_all: false,
-            waiting: None,
             input_ended: false,
             query_at: Duration::ZERO,
             has_answered: false,
@@ -201,40 +199,31 @@ impl Screen {
     }
 
     fn poll_input(&mut self, context: &mut Context<'_>) -> Poll<Msg> {
-        if let Some(msg) = self.waiting.take() {
-            return Poll::Ready(msg);
-        }
         let mut keys = Vec::new();
-        let other = loop {
-            if self.input_ended || keys.len() >= TOGETHER_MAX {
-                break None;
-            }
-            let Some(event) = self.arrived.pop_front() else {
+        while keys.len() < TOGETHER_MAX {
+            if self.arrived.is_empty() && !self.input_ended {
                 match self.events.poll_recv(context) {
-                    Poll::Pending => break None,
                     Poll::Ready(Some(events)) => self.arrived = events,
-                    Poll::Ready(None) => {
+                    // Keys first, in their order; any other input is returned by the next call.
+                    Poll::Ready(None) if keys.is_empty() => {
                         self.input_ended = true;
-                        break Some(Msg::Terminate(TERMINAL_LOST));
+                        return Poll::Ready(Msg::Terminate(TERMINAL_LOST));
                     }
+                    Poll::Ready(None) | Poll::Pending => {}
                 }
-                continue;
-            };
-            match event {
-                Event::Key(event) => keys.extend(Key::from_event(&event)),
-                Event::Paste(_) => break Some(Msg::Pasted),
+            }
+            let may_pass = |event: &mut Event| keys.is_empty() || !matches!(event, Event::Paste(_));
+            match self.arrived.pop_front_if(may_pass) {
+                None => break,
+                Some(Event::Key(event)) => keys.extend(Key::from_event(&event)),
+                Some(Event::Paste(_)) => return Poll::Ready(Msg::Pasted),
                 // Also needed if the size returns to the old one before the next frame: the
                 // terminal has cut its content.
-                Event::Resize(..) => self.clear(),
-                Event::FocusGained | Event::FocusLost | Event::Mouse(_) => {}
+                Some(Event::Resize(..)) => self.clear(),
+                Some(Event::FocusGained | Event::FocusLost | Event::Mouse(_)) => {}
             }
-        };
-        // Keys first, in their order; any other input is returned by the next call.
-        if keys.is_empty() {
-            return other.map_or(Poll::Pending, Poll::Ready);
         }
-        self.waiting = other;
-        Poll::Ready(Msg::Keys(keys))
+        if keys.is_empty() { Poll::Pending } else { Poll::Ready(Msg::Keys(keys)) }
     }
 }
 
@@ -279,9 +268,7 @@ fn theme(config: &Config) -> Theme {
     Theme { palette, ascii }
 }
 
-type Taken = (Terminal<DiffBackend<FrameBuffer>>, TerminalWriter, mpsc::Receiver<VecDeque<Event>>);
-
-fn take_terminal() -> io::Result<Taken> {
+fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWriter)> {
     TAKEN.store(true, Ordering::Relaxed);
     enable_raw_mode()?;
     answers::begin()?;
@@ -294,7 +281,7 @@ fn take_terminal() -> io::Result<Taken> {
     backend.erases = std::env::var_os("STY").is_none();
     backend.has_true_colour =
         std::env::var("COLORTERM").is_ok_and(|colours| ["truecolor", "24bit"].contains(&colours.as_str()));
-    Ok((Terminal::new(backend)?, writer, read_events()?))
+    Ok((Terminal::new(backend)?, writer))
 }
 
 /// Whether a multiplexer at this end of an SSH session answers instead of the terminal: its answer

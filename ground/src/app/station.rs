@@ -218,7 +218,7 @@ impl Station {
         let now = self.clock.now();
         let due = msgs.iter().any(|msg| match msg {
             Msg::Tick => now >= self.report_at,
-            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::LinkWarning(_) => true,
+            Msg::LinkUp(_) | Msg::LinkDown(_) | Msg::LinkWarning(_) | Msg::StoodStill(_) => true,
             _ => false,
         });
         if due {

@@ -17,10 +17,13 @@ use protocol::signing::{Anchor, Lockouts, Signing};
 use protocol::transport::LinkAddress;
 
 use super::clock::{Clock, LogTime};
-use crate::model::{EXPIRES_AFTER, LinkReport, STOOD_STILL};
+use crate::model::{EXPIRES_AFTER, LinkReport};
 use crate::update::Msg;
 
 const FLIGHT_STATUS_ID: u32 = 54_000;
+/// Time after which the run loop counts as stalled: stopped, swapped out, or asleep with its
+/// computer.
+const STOOD_STILL: Duration = Duration::from_secs(1);
 /// How long after a stall the arriving data have waited.
 const WAITED_FOR: Duration = Duration::from_millis(500);
 /// Number of boots stored for each link.
@@ -161,14 +164,13 @@ impl Wire {
         }
     }
 
-    /// Records a pass of the run loop. Returns the warning if it was stalled.
+    /// Records a pass of the run loop. Returns a message if it was stalled.
     pub(super) fn note_awake(&mut self) -> Option<Msg> {
         let now = self.clock.now();
         let stalled = now.saturating_sub(std::mem::replace(&mut self.awake_at, now));
         (stalled >= STOOD_STILL).then(|| {
             self.old_until = now + WAITED_FOR;
-            let (stood_s, waited) = (stalled.as_secs(), "what waited is in the log only");
-            Msg::LinkWarning(format!("this station stood still for {stood_s} s: {waited}"))
+            Msg::StoodStill(stalled)
         })
     }
 

@@ -73,6 +73,8 @@ pub enum Msg {
     LinkDown(String),
     /// A warning about the links for the crew.
     LinkWarning(String),
+    /// The run loop was stalled for so long; frames that waited meanwhile are not passed on.
+    StoodStill(Duration),
     /// The state of the log writer has changed.
     Log(LogHealth),
     /// The station's log continues in these files.
@@ -187,6 +189,12 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             model.link.trouble = Some(why);
         }
         Msg::LinkWarning(words) => model.warn(now, protocol::text::printable(words.as_bytes())),
+        Msg::StoodStill(stalled) => {
+            let (why, stalled_s) = ("this station stood still", stalled.as_secs());
+            model.warn(now, format!("{why} for {stalled_s} s: what waited is in the log only"));
+            // The frames that waited count as lost, and the radio has not lost them.
+            pad::pass_range_test(model, Some(why), now);
+        }
         Msg::OverLink(number) => model.link.received_over = Some(number),
         Msg::FromSource(source) => model.link.source = source,
         Msg::Links { links, signing } => on_reports(model, links, signing, now),

@@ -138,13 +138,13 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
-/// Lets time pass: requests are sent, and the test ends.
-pub(super) fn pass_range_test(model: &mut Model, now: Duration) {
+/// Lets time pass: requests are sent, and the test ends; or `spoiled` or an armed vehicle stops it.
+pub(super) fn pass_range_test(model: &mut Model, spoiled: Option<&'static str>, now: Duration) {
     let armed = model.vehicle.is_armed() || model.vehicle.in_flight();
     let counts = model.link.stats.counts(model.settings.vehicle);
     let Some(test) = model.range_test.as_mut().filter(|test| test.is_running()) else { return };
-    if armed {
-        test.stop("the vehicle is armed");
+    if let Some(why) = spoiled.or(armed.then_some("the vehicle is armed")) {
+        test.stop(why);
     }
     let question = test.pass(counts, now);
     let ended = test.found.map(|found| (found, test.by.clone()));

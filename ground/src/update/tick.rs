@@ -63,7 +63,7 @@ pub(super) fn on_tick(model: &mut Model, now: Duration) {
     commands::poll(model, now);
     commands::observe(model, now);
     commands::hold_if_unfit(model, now);
-    pad::pass_range_test(model, now);
+    pad::pass_range_test(model, None, now);
     vehicle_changes::send_book_end(model, now);
     store_place(model, now);
     vehicle_changes::store_unfinished(model, now);

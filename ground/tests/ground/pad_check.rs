@@ -1,10 +1,12 @@
 //! The checks on the pad as the crew sees them: keys, values, alarms, the radio range test, and the
 //! book.
 
+use std::time::Duration;
+
 use crate::rig::{Rig, settings, typed};
 use ground::key::Key;
 use ground::model::{AlarmKind, LOSS_MOST, Model, Page, Role};
-use ground::update::Action;
+use ground::update::{Action, Msg};
 use protocol::dialect::{
     BATTERY_STATUS_DATA, COMMAND_LONG_DATA, MavCmd, MavMessage, RADIO_STATUS_DATA, STORAGE_INFORMATION_DATA,
     SYS_STATUS_DATA, TD_PAD_CHECK_DATA, TIMESYNC_DATA, TdCheck, TdPadCheckItem as Item,
@@ -302,6 +304,20 @@ fn the_radio_is_tested_with_a_margin_and_a_verdict() {
     range_test(&mut rig, 10);
     let found = rig.model.range_test.as_ref().and_then(|test| test.found).unwrap();
     assert!(!found.passed() && found.loss_up > LOSS_MOST && found.loss_down <= LOSS_MOST, "{found:?}");
+}
+
+#[test]
+fn a_standstill_of_the_station_ends_the_radio_test() {
+    let mut rig = Rig::crewed();
+    rig.key(Key::Char('U'));
+    rig.run(2.0);
+    rig.msg(Msg::StoodStill(Duration::from_secs(3)));
+    rig.expect_event("this station stood still for 3 s: what waited is in the log only");
+    rig.expect_event("radio range test STOPPED, this station stood still");
+    assert_eq!(
+        rig.model.range_test.as_ref().and_then(|test| test.found).map(|found| found.passed()),
+        Some(false)
+    );
 }
 
 #[test]
