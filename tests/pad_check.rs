@@ -6,7 +6,7 @@ use e2e::{Bound, Program, Running, Signal, Terminal, keygen, program};
 
 /// A large window: the page of the checks shows everything at once.
 const SIZE: (u16, u16) = (100, 34);
-/// So often a busy machine may spoil what a crew does.
+/// Most attempts at an action that a busy machine may spoil.
 const ATTEMPTS: usize = 4;
 
 fn station(folder: &Path) -> Terminal {

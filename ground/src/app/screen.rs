@@ -41,7 +41,7 @@ use crate::view::Theme;
 const TOGETHER_MAX: usize = 1_024;
 /// A paste has ended when nothing has arrived for this long; on a slow line its parts arrive apart.
 const QUIET_FOR: Duration = Duration::from_millis(50);
-/// The thread that reads the events queries so often whether the screen has ended.
+/// Interval at which the thread that reads the events checks whether the screen has ended.
 const LOOK_AGAIN_AFTER: Duration = Duration::from_millis(100);
 /// The longest wait for the end of a paste.
 const QUIET_WITHIN: Duration = Duration::from_secs(2);
@@ -68,7 +68,7 @@ pub struct Screen {
     terminal: ManuallyDrop<Terminal<DiffBackend<FrameBuffer>>>,
     writer: TerminalWriter,
     events: mpsc::Receiver<VecDeque<Event>>,
-    /// Of the events that arrived together, those that were not passed on yet.
+    /// Events that arrived together and were not passed on yet.
     arrived: VecDeque<Event>,
     pub theme: Theme,
     bell: bool,
@@ -233,10 +233,10 @@ impl Drop for Screen {
     }
 }
 
-/// Reads the terminal's events in a thread until the screen or the terminal ends, and passes on
-/// together what has arrived together. At each turn of the main loop, crossterm's own stream would
-/// try its reader's lock, which a waiting thread holds: that yields the processor several times,
-/// each for as long as a busy machine wants.
+/// Reads the terminal's events in a thread until the screen or the terminal ends. Events that
+/// arrived together are passed on together. crossterm's own stream would try its reader's lock at
+/// each turn of the main loop, while a waiting thread holds it: each try yields the processor
+/// several times, which takes long on a busy machine.
 fn read_events() -> io::Result<mpsc::Receiver<VecDeque<Event>>> {
     let (sender, events) = mpsc::channel(1);
     in_a_thread("events", move || -> io::Result<()> {

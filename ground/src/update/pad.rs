@@ -138,7 +138,8 @@ pub(super) fn begin_range_test(model: &mut Model, by: Seat, now: Duration) {
     model.range_test = Some(RangeTest::begin(by, counts, now));
 }
 
-/// Lets time pass: requests are sent, and the test ends; or `spoiled` or an armed vehicle stops it.
+/// Lets time pass: sends requests, and ends the test. Stops it for the reason `spoiled`, or because
+/// the vehicle is armed.
 pub(super) fn pass_range_test(model: &mut Model, spoiled: Option<&'static str>, now: Duration) {
     let armed = model.vehicle.is_armed() || model.vehicle.in_flight();
     let counts = model.link.stats.counts(model.settings.vehicle);

@@ -129,8 +129,8 @@ pub(super) async fn read_all(
 
 // Serial lines: opened again when the device comes back.
 
-/// Serves a serial line in a thread of its own: to open it waits for a file system that stalls, and
-/// to read or query it waits for the kernel's worker behind it, on a busy machine for seconds.
+/// Serves a serial line in a thread of its own. Opening the device can wait for a file system that
+/// stalls. Reading or polling it can wait for the kernel's worker, on a busy machine for seconds.
 pub(super) fn open_serial(path: String, baud: u32, queues: Queues) -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let serve = move || runtime.block_on(run(Port { path, baud }, queues));
