@@ -182,6 +182,10 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 /// solution may still be optimal.
 const AS_EXPECTED: f64 = 1e-6;
 
+/// First barrier of the barrier method after `pursue`: with a smaller one three quarters of its
+/// steps are blocked by limits that change sides.
+const SECOND_BARRIER: f64 = 1.0;
+
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
     /// Solves from an earlier solution. It is returned unchanged if it is still optimal. Otherwise
     /// the steps of `clamped`, the barrier method and a cold solve are tried in this order until
@@ -207,7 +211,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             }
             start::warm(model, &self.conditions, warm, LAST_BARRIER, &mut self.current);
         }
-        let mut outcome = self.descend(model, LAST_BARRIER, cap - iterations);
+        start::raise(model, &self.conditions, SECOND_BARRIER, &mut self.current);
+        let mut outcome = self.descend(model, SECOND_BARRIER, cap - iterations);
         iterations += outcome.iterations;
         sweeps += outcome.sweeps;
         let failed = matches!(outcome.status, Status::Stalled | Status::SubproblemFailed);

@@ -210,6 +210,15 @@ const ROUNDING: f64 = 1e-13;
 /// Largest number of stored points; the oldest are dropped.
 const CAPACITY: usize = 32;
 
+/// Largest number of whole steps at one barrier that are taken without progress, the largest growth
+/// of the defects by one, and the defects from which it counts. Without such steps 38 % of the
+/// evaluations in a cold solve are of points that the filter rejects. With them 1,000 cold solves in
+/// space take 0.67 of the time, and the longest 223 instead of 435 iterations. 5 or 20 steps and a
+/// growth by 30 or 1,000 differ by less than 3 %.
+const TOLERATED_STEPS: u32 = 10;
+const TOLERATED_GROWTH: f64 = 100.0;
+const TOLERATED_FROM: f64 = 1e-3;
+
 /// Defects and objective of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Measures {
@@ -233,6 +242,8 @@ pub(crate) struct Filter {
     ceiling: f64,
     /// Defects up to which a step that should lower the objective is judged by the objective alone.
     small: f64,
+    /// Number of [tolerated](Self::tolerates) steps at this barrier.
+    tolerated: u32,
 }
 
 impl Default for Filter {
@@ -243,6 +254,7 @@ impl Default for Filter {
             oldest: 0,
             ceiling: f64::INFINITY,
             small: 0.0,
+            tolerated: 0,
         }
     }
 }
@@ -258,6 +270,7 @@ impl Filter {
     pub(crate) fn clear(&mut self) {
         self.used = 0;
         self.oldest = 0;
+        self.tolerated = 0;
     }
 
     /// Whether a trial point at `fraction` of a step is progress over `now`. If the point is
@@ -286,6 +299,15 @@ impl Filter {
         }
         self.add(now);
         true
+    }
+
+    /// Whether a whole step is taken although it is not progress: the defects that the curvature of
+    /// the dynamics causes disappear in the next steps, and half a step only delays them.
+    pub(crate) fn tolerates(&mut self, now: Measures, trial: Measures) -> bool {
+        let most = TOLERATED_GROWTH * now.infeasibility.max(TOLERATED_FROM);
+        let tolerated = self.tolerated < TOLERATED_STEPS && trial.is_finite() && trial.infeasibility <= most;
+        self.tolerated += u32::from(tolerated);
+        tolerated
     }
 
     fn add(&mut self, point: Measures) {

@@ -19,12 +19,6 @@ const RAISING_FACTOR: f64 = 100.0;
 /// Largest number of times that the barrier is raised.
 const RAISES: u32 = 4;
 
-/// How much longer the descent may be that begins where the best cold one ended at its cap beside a
-/// saddle: there the residual grows by a hundredth in each iteration. Of 30,000 cold starts in the
-/// box around the landing paper's problem on which nothing was chosen, one still ends at its cap,
-/// with its condition missed by 1.6 mm.
-const LONGER: usize = 10;
-
 /// If less than this fraction of a step is possible, primal or dual, the iterate is jammed between
 /// limits.
 const STEP_FRACTION_MIN: f64 = 0.1;
@@ -34,10 +28,6 @@ const STEP_FRACTION_MIN: f64 = 0.1;
 /// leave them: with six, two of 30,000 cold starts of the landing paper's problem end at their cap,
 /// with eight none.
 const CREEPS: u32 = 8;
-
-/// If the line search shortens a step to less than this fraction, the Hessian is nearly singular,
-/// and the next step has less of the dynamics' curvature.
-const SHORT_STEP: f64 = 0.1;
 
 /// A barrier problem is solved when its residual is at most this multiple of the barrier.
 const BARRIER_TOLERANCE: f64 = 30.0;
@@ -59,10 +49,6 @@ pub(crate) const CURVATURE_SHARES: [f64; 4] = [1.0, 0.9, 0.5, 0.0];
 
 /// Shortest fraction that is tried of the step that the slacks allow.
 const SHORTEST_STEP: f64 = 1.0 / 1024.0;
-
-/// A step of the inputs this small, in their units, is taken without a test: the objective's
-/// rounding error is larger than its possible decrease.
-const TINY_STEP: f64 = 1e-7;
 
 /// Buffers of a solve, reused so that the next solve does not allocate. The result does not depend
 /// on them, except on the remaining [allowance](Self::allow).
@@ -135,27 +121,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 self.best.move_to(&self.current);
             }
         }
-        let Some((best, merit)) = best else {
-            self.current.move_to(&self.best);
-            return SolveEnd { iterations, sweeps, ..SolveEnd::BAD };
-        };
-        if best.status != Status::Converged
-            && best.miss <= settings.acceptable_miss
-            && !self.allowance.is_spent()
-        {
-            // It creeps along a saddle. From its end, with the slacks opened again, it gets time to
-            // find the descent.
-            self.current.move_to(&self.best);
-            start::raise(model, &self.conditions, RAISED_BARRIER, &mut self.current);
-            let mut again = self.descend(model, RAISED_BARRIER, LONGER * cap);
-            iterations += again.iterations;
-            sweeps += again.sweeps;
-            again.miss = self.current.worst_violation(&self.conditions);
-            if again.status == Status::Converged && self.current.merit(model, &self.conditions) <= merit {
-                return SolveEnd { iterations, sweeps, ..again };
-            }
-        }
         self.current.move_to(&self.best);
+        let best = best.map_or(SolveEnd::BAD, |(outcome, _)| outcome);
         SolveEnd { iterations, sweeps, ..best }
     }
 
@@ -207,16 +174,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
             let full = fractions.primal.min(fractions.dual) >= 1.0;
             crept = if right > 0 && full { crept + 1 } else { 0 };
             let creeps = crept >= CREEPS && raises < RAISES;
-            let taken = if jammed || creeps {
-                None
-            } else {
-                self.advance(model, barrier, fractions, residual.infeasibility)
-            };
-            if let Some(taken) = taken {
+            if !jammed && !creeps && self.advance(model, barrier, fractions, residual.infeasibility) {
                 residual = self.residual(model);
-                if taken < SHORT_STEP {
-                    first = (right + 1).min(CURVATURE_SHARES.len() - 1);
-                }
                 continue;
             }
             if raises >= RAISES {
@@ -232,13 +191,12 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
         SolveEnd { status, iterations, sweeps, residual, ..SolveEnd::BAD }
     }
 
-    /// Line search along the step from `current`. Returns the fraction at which a point was
-    /// accepted; it is then `current`.
-    fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> Option<f64> {
+    /// Line search along the step from `current`. Returns whether a point was accepted; it is then
+    /// `current`.
+    fn advance(&mut self, model: &M, barrier: f64, fractions: Fractions, infeasibility: f64) -> bool {
         let slope = self.newton.slope(model, &self.current, barrier);
         let objective = self.current.barrier_objective(model, barrier);
         let now = Measures { infeasibility, objective };
-        let tiny = self.newton.largest_input_step(model) <= TINY_STEP;
         let mut share = 1.0;
         while share >= SHORTEST_STEP {
             let tried = Fractions { primal: share * fractions.primal, dual: fractions.dual };
@@ -249,13 +207,15 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
                 infeasibility: self.trial.infeasibility(),
                 objective: self.trial.barrier_objective(model, barrier),
             };
-            if self.filter.accepts(now, trial, slope, tried.primal) || tiny && trial.is_finite() {
+            let accepted = self.filter.accepts(now, trial, slope, tried.primal)
+                || share >= 1.0 && self.filter.tolerates(now, trial);
+            if accepted {
                 core::mem::swap(&mut self.current, &mut self.trial);
-                return Some(share);
+                return true;
             }
             share *= 0.5;
         }
-        None
+        false
     }
 
     /// Evaluates `current` with its derivatives.
