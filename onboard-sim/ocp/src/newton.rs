@@ -210,11 +210,11 @@ const ROUNDING: f64 = 1e-13;
 /// Largest number of stored points; the oldest are dropped.
 const CAPACITY: usize = 32;
 
-/// Largest number of whole steps at one barrier that are taken without progress, the largest growth
-/// of the defects by one, and the defects from which it counts. Without such steps the filter
-/// rejects 38 % of the points that a cold solve evaluates. With them 1,000 cold solves in space take
-/// 0.67 of the time, and the longest 223 instead of 435 iterations. 5 or 20 steps and a growth by 30
-/// or 1,000 differ by less than 3 %.
+/// Largest number of whole steps at one barrier that are taken without progress, the largest
+/// growth of the defects by one, and the defects from which it counts. Without such steps the
+/// filter rejects 38 % of the points that a cold solve evaluates. With them 1,000 cold solves in
+/// space take 0.67 of the time, and the longest 223 instead of 435 iterations. 5 or 20 steps and
+/// a growth by 30 or 1,000 differ by less than 3 %.
 const TOLERATED_STEPS: u32 = 10;
 const TOLERATED_GROWTH: f64 = 100.0;
 const TOLERATED_FROM: f64 = 1e-3;
