@@ -4,6 +4,7 @@ use core::fmt;
 
 use flight::rules::verdict::Landing;
 use serde::Serialize;
+use statrs::distribution::{Beta, ContinuousCDF as _};
 
 /// 97.5 % point of the normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
@@ -38,6 +39,19 @@ impl Share {
         let high = if count == of { 1.0 } else { (centre + half) / scale };
         Self { count, of, share, low, high }
     }
+
+    /// The same count with an interval that holds the true fraction at all of so many looks: the
+    /// exact one of C. J. Clopper and E. S. Pearson (Biometrika 26, 1934), with the error divided
+    /// among the looks (Bonferroni's inequality).
+    fn at_looks(self, looks: u32) -> Self {
+        let tail = 0.025 / f64::from(looks);
+        let (inside, outside) = (self.count as f64, (self.of - self.count) as f64);
+        // The fraction of no and of all flights has no such end, and no such distribution.
+        let end = |a: f64, b: f64, quantile: f64| Beta::new(a, b).ok().map(|beta| beta.inverse_cdf(quantile));
+        let low = end(inside, outside + 1.0, tail).unwrap_or(0.0);
+        let high = end(inside + 1.0, outside, 1.0 - tail).unwrap_or(1.0);
+        Self { low, high, ..self }
+    }
 }
 
 impl fmt::Display for Share {
@@ -64,6 +78,13 @@ impl Landings {
             counts.iter_mut().zip(landing.flags()).for_each(|(count, flag)| *count += u64::from(flag));
         }
         let [stands, upright, envelope, table_2] = counts.map(|count| Share::new(count, of));
+        Self { stands, upright, envelope, table_2 }
+    }
+
+    /// The same counts with intervals that hold at all of so many looks at a growing sample.
+    #[must_use]
+    pub fn at_looks(self, looks: u32) -> Self {
+        let [stands, upright, envelope, table_2] = self.shares().map(|share| share.at_looks(looks));
         Self { stands, upright, envelope, table_2 }
     }
 
@@ -111,6 +132,20 @@ mod tests {
         assert!((all.low - 1000.0 / 1_003.841_459).abs() < 1e-9, "{all:?}");
         assert!((all.high - 1.0).abs() < 1e-15);
         assert!(Share::new(0, 5).low.abs() < 1e-15 && Share::new(0, 0).high >= 1.0);
+    }
+
+    /// At each end the count, or one farther from it, has the probability of the tail.
+    #[test]
+    fn val_clopper_pearson_by_hand() {
+        let at = |count, of, looks| Share::new(count, of).at_looks(looks);
+        let all = at(50, 50, 3);
+        assert!((all.low - (0.025_f64 / 3.0).powf(0.02)).abs() < 1e-9 && all.high >= 1.0, "{all:?}");
+        let none = at(0, 20, 1);
+        assert!(none.low <= 0.0 && (none.high - (1.0 - 0.025_f64.powf(0.05))).abs() < 1e-9, "{none:?}");
+        let most = at(49, 50, 3);
+        let at_least = |p: f64| p.powi(50) + 50.0 * p.powi(49) * (1.0 - p);
+        assert!((at_least(most.low) - 0.025 / 3.0).abs() < 1e-9, "{most:?}");
+        assert!((1.0 - most.high.powi(50) - 0.025 / 3.0).abs() < 1e-9, "{most:?}");
     }
 
     #[test]

@@ -133,12 +133,12 @@ fn refuse_without_a_landing(recipe: &Recipe) -> Result<(), CardError> {
 /// Between neighbouring masses, as a share of the nominal mass, and the steps on each side.
 const STEP: f64 = 0.02;
 const STEPS: u32 = 10;
-/// Most masses flown on a side: the halvings of its steps.
-const MOST_MASSES: usize = 4;
+/// Most masses flown on a side: the farthest, and the halvings of the steps before it.
+const MOST_MASSES: usize = 5;
 
 /// Landing rates at the mission's mass and, on each side, at the farthest at which nine of ten land
-/// and the nearest at which fewer do: the steps between are halved, because the rate only falls
-/// with the distance. Ballast is at the centre of gravity.
+/// and the nearest at which fewer do. The rate only falls with the distance: the farthest mass is
+/// flown first, and the steps before it are halved. Ballast is at the centre of gravity.
 fn masses(
     recipe: &Recipe,
     nominal: Landings,
@@ -156,7 +156,7 @@ fn masses(
         }
         let (mut good, mut bad) = ((0, None), (STEPS + 1, None));
         while bad.0 - good.0 > 1 {
-            let step = good.0.midpoint(bad.0);
+            let step = if bad.0 > STEPS { STEPS } else { good.0.midpoint(bad.0) };
             let mass = frame.with(&recipe.mission.motor_curve, side * f64::from(step) * STEP * nominal_kg);
             let landings = match changed(recipe, &airframe.motor, &mass) {
                 Ok(other) => Some(decided(&other, flights, &|done| going_on(flown + done))?),
@@ -176,16 +176,17 @@ fn masses(
 }
 
 /// Flies until it is decided whether nine of ten land: until 0.9 is outside of the interval of the
-/// rate, or so many flights are flown.
+/// rate, which is valid at every look, or so many flights are flown.
 fn decided(recipe: &Recipe, flights: u64, done: &(dyn Fn(usize) + Sync)) -> Result<Landings, CardError> {
-    /// Between two looks.
-    const BATCH: u64 = 25;
+    /// Flights before the first look. Each further look is at twice as many.
+    const FIRST: u64 = 25;
+    let looks = 1 + flights.div_ceil(FIRST).next_power_of_two().ilog2();
     let mut rows = Vec::new();
     loop {
         let from = rows.len() as u64;
-        let to = flights.min(from + BATCH);
+        let to = flights.min(FIRST.max(2 * from));
         rows.extend(fly(recipe, from..to, &|flown| done(from as usize + flown))?);
-        let landings = Landings::of(rows.iter().map(Row::landing));
+        let landings = Landings::of(rows.iter().map(Row::landing)).at_looks(looks);
         let open = (landings.stands.low..=landings.stands.high).contains(&NINE_OF_TEN);
         if to == flights || !open {
             return Ok(landings);
