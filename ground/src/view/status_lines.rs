@@ -163,11 +163,11 @@ pub fn alarm_text(model: &Model, theme: Theme, now: Duration, columns: usize) ->
     };
     let key = if alarm.acknowledged || columns < KEY_FROM_COLUMNS { "" } else { KEY };
     let (word, age, role) = alarm_state(alarm, now);
-    let taken = 1 + word.len() + 1 + 1 + age.len() + more.len() + key.len();
+    let taken = 1 + word.len() + 1 + 2 + age.len() + more.len() + key.len();
     // On the narrowest screens the text is more important than its age.
     let room = columns.saturating_sub(taken).max(TEXT_COLUMNS_MIN);
     let text = cut(&alarm.what.text, room);
-    let line = format!(" {word} {text} {age}{more}");
+    let line = format!(" {word} {text}, {age}{more}");
     let blank = columns.saturating_sub(key.len() + Span::raw(&*line).width());
     let mut spans = vec![theme.span(format!("{line}{:blank$}", ""), role)];
     if !key.is_empty() {

@@ -175,7 +175,7 @@ fn attaching_does_not_ring_for_past_alarms() {
     over.run(30.0);
     assert_eq!(bells(&over), 0);
     let screen = over.screen(80, 24);
-    assert!(screen.contains(" past alarm: LINK LOST: no telemetry ended 89 s ago"), "{screen}");
+    assert!(screen.contains(" past alarm: LINK LOST: no telemetry, ended 89 s ago"), "{screen}");
     over.speaks = false;
     over.run(5.0);
     assert_eq!(bells(&over), 1, "lost again");
@@ -320,7 +320,7 @@ fn a_long_alarm_text_never_hides_the_key_that_acknowledges() {
         let screen = rig.screen(columns, rows);
         let line = screen.lines().find(|line| line.contains("ALARM LINK DOWN")).unwrap_or_default();
         assert!(line.trim_end_matches('"').ends_with(" Space: seen "), "{screen}");
-        assert!(line.contains(".. 1 s ago "), "the age is not cut either: {screen}");
+        assert!(line.contains(".., 1 s ago "), "the age is not cut either: {screen}");
         let identity = screen.lines().next().unwrap_or_default();
         assert!(identity.contains("boot 1A2B3C4D"), "nor is who it is: {screen}");
     }
