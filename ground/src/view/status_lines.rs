@@ -143,7 +143,7 @@ const KEY: &str = " Space: seen ";
 /// On a narrower line the key is left out.
 const KEY_FROM_COLUMNS: usize = 40;
 /// The shortest useful part of a text.
-const TEXT_COLUMNS_MIN: usize = 12;
+const TEXT_COLUMNS_MIN: usize = 11;
 
 /// The position of a replay, and its keys.
 pub fn replay_line(playing: &Playback, theme: Theme) -> Line<'static> {
