@@ -15,7 +15,7 @@
 
 use crate::model::InputRange;
 
-/// Barrier of a warm solve, and the last of every solve.
+/// Barrier of the multipliers that a warm start takes over, and the last of every solve.
 pub(crate) const LAST_BARRIER: f64 = 1e-8;
 
 /// Slacks up to this do not change a multiplier.

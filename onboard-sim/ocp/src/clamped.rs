@@ -182,8 +182,8 @@ impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {
 /// solution may still be optimal.
 const AS_EXPECTED: f64 = 1e-6;
 
-/// First barrier of the barrier method after `pursue`: with a smaller one three quarters of its
-/// steps are blocked by limits that change sides.
+/// First barrier of the barrier method in a warm solve. From `LAST_BARRIER`, limits that change
+/// sides block three quarters of its steps.
 const SECOND_BARRIER: f64 = 1.0;
 
 impl<M: Model<NX, NU>, const NX: usize, const NU: usize> Workspace<M, NX, NU> {

@@ -38,18 +38,19 @@
 //! 4. `riccati`: computes the Newton step by a backward and a forward sweep with the exact Hessian.
 //!    In the backward sweep an interval eliminates itself ([`Interval::eliminate`]). The inertia is
 //!    right exactly if one matrix per stage, with a row for each input, is positive definite. If it
-//!    is not, the sweep runs again with half the dynamics' curvature, and then without it.
+//!    is not, the sweep runs again with less of the dynamics' curvature, and last without it.
 //! 5. `newton`: finds the longest fractions of the step that keep slacks and multipliers positive,
 //!    primal and dual separately.
-//! 6. `newton`: halves the step until defects or objective make progress.
+//! 6. `newton`: halves the step until defects or objective make progress. At each barrier it takes
+//!    a few whole steps without progress.
 //!
 //! `solver` is the loop. A cold solve runs it from the model's guesses (`start`). A warm solve
 //! takes over states, inputs and all multipliers, and first checks whether they are still optimal.
 //! If not, it treats the active limits and conditions as equations (`clamped`), which needs no
 //! barrier and no line search. A solve that may take only a few iterations ends with that. If it
-//! does not converge, the loop starts at the last barrier, and raises it once if the first step
-//! shows that many limits and conditions must change sides. Iterations are capped; there is no
-//! clock.
+//! does not converge, the loop starts from the earlier solution at a barrier of 1. If a step is
+//! nearly blocked at a small barrier, the barrier is raised once. Iterations are capped; there is
+//! no clock.
 //!
 //! The sweeps are compiled twice, for plain and for wider vectors, and the program uses the widest
 //! that the machine has (`pulp`). Both execute the same operations in the same order and fuse none,
