@@ -305,8 +305,12 @@ pub fn studies(
 }
 
 /// Flies every case of a recipe's mission, and the widest ones as often as requested. `done`
-/// gets the number of flights flown, and of all: before the widest cases are determined, of one
-/// of them.
+/// gets the number of flights flown, and of all, if those that are the widest so far remain it.
+///
+/// Dropping a case because of its flights makes no upper end too small more often than its interval
+/// says: upper ends need more flights than the default survey has, so each case has one number of
+/// flights at which it can have one. Lower ends are taken at up to three numbers, each with its
+/// own error.
 ///
 /// # Errors
 /// A flight cannot be set up.
@@ -333,10 +337,14 @@ pub fn study(
             let of_case = impacts.iter().filter(|impact| impact.case == case);
             of_case.map(Impact::distance_m).fold(0.0, f64::max)
         };
-        let least_m = share * cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
+        let all_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
+        let least_m = share * all_m;
         cases.retain(|case| farthest_m(*case) >= least_m || rate && *case == Case::AsPlanned);
         let before = impacts.len();
-        let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize;
+        let nearly = cases.iter().filter(|case| farthest_m(**case) >= NEARLY * all_m).count();
+        // Before the first flights every case would be.
+        let widest = if impacts.is_empty() { 1 } else { nearly };
+        let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize * widest;
         impacts.extend(fly_some(&cases, from..to, &|flown| done(before + flown, of))?);
         from = to;
     }
