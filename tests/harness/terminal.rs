@@ -155,7 +155,9 @@ impl Terminal {
     /// busy machine may leave a link silent for a second, which holds the countdown: then it is
     /// started again, and armed, if it was not started for long. `ending` is shown once it is over.
     pub fn arm_and_start(&mut self, countdown: Duration, ending: &str) {
-        self.type_until(b"AARM\r", " ARMED ");
+        if !self.window().shows(" ARMED ") {
+            self.type_until(b"AARM\r", " ARMED ");
+        }
         self.type_until(b"SSTART\r", "START  commanded");
         while self.wait_within(countdown, |window| window.shows(" T+").then_some(())).is_none() {
             if self.window().shows(" disarmed PAD_IDLE") {

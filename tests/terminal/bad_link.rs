@@ -79,8 +79,7 @@ fn an_arm_whose_answers_are_lost_is_repeated_for_two_seconds_done_once_and_the_h
 #[test]
 fn without_a_link_values_are_marked_old_the_path_is_predicted_and_an_abort_is_repeated() {
     let mut rig = Rig::new("mk2");
-    rig.arm();
-    rig.start();
+    rig.fly();
     rig.terminal.wait_for(" AERO_DESCENT ");
     rig.proxy.impair(Impairment { drops_all: true, ..Impairment::default() });
     rig.terminal.wait_for("~AERO_DESCENT");

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 use e2e::{Signal, Terminal};
 use ground::app::files::LogGuard;
@@ -29,11 +30,20 @@ fn complete_log(path: &Path, topic: &str) -> Vec<String> {
     found
 }
 
+/// Quits with the key. A station that stood still leaves out what was typed meanwhile.
+fn quit(terminal: &mut Terminal) {
+    let has_ended = |terminal: &mut Terminal| {
+        terminal.type_by_hand(b"q");
+        terminal.wait_within(Duration::from_secs(10), |window| window.is_closed().then_some(())).is_some()
+    };
+    assert!((0..6).any(|_| has_ended(terminal)), "{:?}", terminal.window().rows());
+}
+
 #[test]
 fn when_quit_or_terminated_it_restores_the_terminal_and_completes_its_log() {
     type Ending = fn(&mut Terminal);
     let endings: [(Ending, bool); 8] = [
-        (|terminal| terminal.type_by_hand(b"q"), false),
+        (quit, false),
         // Ctrl-C, as a terminal that distinguishes repeats sends it.
         (|terminal| terminal.type_bytes(b"\x1b[99;5u"), true),
         (|terminal| terminal.signal(Signal::SIGTERM), true),

@@ -7,8 +7,7 @@ use super::rig::{Rig, SIZE, ground};
 #[test]
 fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically() {
     let mut rig = Rig::new("mk2");
-    rig.arm();
-    rig.start();
+    rig.fly();
     rig.terminal.wait_for("AERO_DESCENT");
     let (arms, starts) = (rig.sent(ARM, 1.0), rig.sent(START, 0.0));
     rig.reboot_vehicle();
@@ -28,8 +27,7 @@ fn a_reboot_in_the_descent_is_reported_and_nothing_is_armed_again_automatically(
     );
     assert!(!rig.terminal.window().shows(" ARMED "));
     // Commands work again.
-    rig.arm();
-    rig.start();
+    rig.fly();
     rig.terminal.wait_for("AERO_DESCENT");
     rig.abort();
     rig.wait_for_fact("ABORT", "acknowledged accepted  observed yes");

@@ -2,7 +2,7 @@
 
 use e2e::{Signal, Window};
 
-use super::rig::{Rig, SIZE};
+use super::rig::{COUNTDOWN, Rig, SIZE};
 
 /// The smallest and the largest screen, both extreme shapes, and the sizes on both sides of where
 /// panels appear.
@@ -65,7 +65,7 @@ fn after_many_changes_of_size_the_screen_is_right_at_every_size() {
     rig.terminal.resize((20, 5));
     rig.type_until(b"AARM\r", " ARMED");
     rig.terminal.resize(SIZE);
-    rig.start();
+    rig.terminal.arm_and_start(COUNTDOWN, " T+");
     for step in 0..STORM {
         rig.terminal.resize(SIZES[usize::from(step % 8)]);
     }

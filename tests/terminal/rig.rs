@@ -3,11 +3,15 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::time::Duration;
 
 use e2e::{Program, Running, Signal, Terminal, UdpProxy, program};
 use protocol::dialect::MavCmd;
 
 pub(crate) const SIZE: (u16, u16) = (80, 24);
+
+/// A flight begins ten seconds after its start, if nothing holds it.
+pub(crate) const COUNTDOWN: Duration = Duration::from_secs(20);
 
 /// `ground` with these arguments and with settings of the test's own.
 pub(crate) fn ground(folder: &Path, arguments: &[&str]) -> Command {
@@ -88,6 +92,12 @@ impl Rig {
     pub(crate) fn start(&mut self) {
         self.type_until(b"SSTART\r", "START  commanded");
         self.wait_for_fact("START", "observed yes");
+    }
+
+    /// Arms and starts until the flight begins.
+    pub(crate) fn fly(&mut self) {
+        self.terminal.wait_for("every arming check passes");
+        self.terminal.arm_and_start(COUNTDOWN, " T+");
     }
 
     pub(crate) fn abort(&mut self) {
