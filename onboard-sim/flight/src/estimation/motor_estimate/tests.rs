@@ -144,6 +144,26 @@ fn ignition_is_timed_within_a_frame_and_the_air_scale_is_estimated_before_it() {
     assert!(rms_s < 0.0025, "{rms_s}");
 }
 
+/// With a negative one a prediction of the fall has no terminal speed, and is no number. The bits of
+/// such a result differ between processors.
+#[test]
+fn the_air_scale_stays_positive_whatever_is_measured() {
+    let mut estimate = MotorEstimate::new(&MotorPrior::default());
+    for frame in 0..400 {
+        let sample = MotorSample {
+            time_s: 0.005 * f64::from(frame),
+            axial_specific_force_m_s2: -10.0,
+            mass_kg: 1.0,
+            axial_air_force_n: 5.0,
+            gimbal_rad: [0.0; 2],
+            may_burn: false,
+        };
+        estimate.update(&CURVE, &sample);
+    }
+    assert!(estimate.mean[AIR] < 0.0, "{}", estimate.mean[AIR]);
+    assert!(estimate.air_scale() > 0.0);
+}
+
 #[test]
 fn future_thrust_is_predicted_within_its_stated_uncertainty() {
     let mut normal = Normal(2);
