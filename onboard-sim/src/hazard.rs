@@ -295,8 +295,7 @@ pub fn studies(
     done: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Vec<Impact>>, RunError> {
     let mut before = 0;
-    let of_each = recipes.iter().enumerate().map(|(place, recipe)| {
-        let left = recipes.len() - place;
+    let of_each = (1..=recipes.len()).rev().zip(recipes).map(|(left, recipe)| {
         let impacts = study(recipe, flights, &|flown, of| done(before + flown, before + left * of))?;
         before += impacts.len();
         Ok(impacts)
@@ -338,12 +337,11 @@ pub fn study(
             of_case.map(Impact::distance_m).fold(0.0, f64::max)
         };
         let all_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
-        let least_m = share * all_m;
-        cases.retain(|case| farthest_m(*case) >= least_m || rate && *case == Case::AsPlanned);
+        let reaches = |share: f64, case: &Case| farthest_m(*case) >= share * all_m;
+        cases.retain(|case| reaches(share, case) || rate && *case == Case::AsPlanned);
         let before = impacts.len();
-        let nearly = cases.iter().filter(|case| farthest_m(**case) >= NEARLY * all_m).count();
-        // Before the first flights every case would be.
-        let widest = if impacts.is_empty() { 1 } else { nearly };
+        // Before the first flights every case would be among the widest.
+        let widest = cases.iter().filter(|case| before > 0 && reaches(NEARLY, case)).count().max(1);
         let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize * widest;
         impacts.extend(fly_some(&cases, from..to, &|flown| done(before + flown, of))?);
         from = to;
@@ -487,20 +485,15 @@ fn come_down(flight: &mut Sortie, mut look: impl FnMut(&Sortie) -> bool) -> (Opt
     };
     while goes_on(flight) && look(flight) {
         course.note(flight);
-        if flight.computer().commands().outputs.is_on(PyroOutput::Parachute) {
-            // The computer has nothing to decide any more: its commands stay as they are.
-            let last = *flight.computer().commands();
-            flight.step();
-            if *flight.computer().commands() == last {
-                let held =
-                    Actuators { gimbal_rad: last.gimbal_rad, fins_rad: last.fins_rad, ..Actuators::NONE };
-                while goes_on(flight) {
-                    course.note(flight);
-                    flight.world_mut().advance(&held, LONG_STRIDE);
-                }
+        let last = *flight.computer().commands();
+        flight.step();
+        // The computer has nothing to decide any more: its commands stay as they are.
+        if last.outputs.is_on(PyroOutput::Parachute) && *flight.computer().commands() == last {
+            let held = Actuators { gimbal_rad: last.gimbal_rad, fins_rad: last.fins_rad, ..Actuators::NONE };
+            while goes_on(flight) {
+                course.note(flight);
+                flight.world_mut().advance(&held, LONG_STRIDE);
             }
-        } else {
-            flight.step();
         }
     }
     let place_m = flight.world().state().position_m;
