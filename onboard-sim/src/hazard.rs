@@ -304,12 +304,12 @@ pub fn studies(
 }
 
 /// Flies every case of a recipe's mission, and the widest ones as often as requested. `done`
-/// gets the number of flights flown, and of all, if those that are the widest so far remain it.
+/// gets the number of flights flown, and of all, assuming that the widest cases so far stay
+/// the widest.
 ///
-/// Dropping a case because of its flights makes no upper end too small more often than its interval
-/// says: upper ends need more flights than the default survey has, so each case has one number of
-/// flights at which it can have one. Lower ends are taken at up to three numbers, each with its
-/// own error.
+/// Dropping a case does not weaken the upper end of a radius. An upper end needs more flights than
+/// the default survey has, so it is computed only once, after all flights. A lower end may be that
+/// of any of the three stages; each of them has the stated error.
 ///
 /// # Errors
 /// A flight cannot be set up.
@@ -336,13 +336,13 @@ pub fn study(
             let of_case = impacts.iter().filter(|impact| impact.case == case);
             of_case.map(Impact::distance_m).fold(0.0, f64::max)
         };
-        let all_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
-        let reaches = |share: f64, case: &Case| farthest_m(*case) >= share * all_m;
+        let overall_m = cases.iter().map(|case| farthest_m(*case)).fold(0.0, f64::max);
+        let reaches = |share: f64, case: &Case| farthest_m(*case) >= share * overall_m;
         cases.retain(|case| reaches(share, case) || rate && *case == Case::AsPlanned);
         let before = impacts.len();
         // Before the first flights every case would be among the widest.
-        let widest = cases.iter().filter(|case| before > 0 && reaches(NEARLY, case)).count().max(1);
-        let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize * widest;
+        let likely = cases.iter().filter(|case| before > 0 && reaches(NEARLY, case)).count().max(1);
+        let of = before + (to - from) as usize * cases.len() + (of_widest - to) as usize * likely;
         impacts.extend(fly_some(&cases, from..to, &|flown| done(before + flown, of))?);
         from = to;
     }

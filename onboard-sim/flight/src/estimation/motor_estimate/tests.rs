@@ -144,8 +144,8 @@ fn ignition_is_timed_within_a_frame_and_the_air_scale_is_estimated_before_it() {
     assert!(rms_s < 0.0025, "{rms_s}");
 }
 
-/// With a negative one a prediction of the fall has no terminal speed, and is no number. The bits of
-/// such a result differ between processors.
+/// A fall with a negative air scale has no terminal speed: its predicted speed is NaN, and the sign
+/// of a NaN differs between processors.
 #[test]
 fn the_air_scale_stays_positive_whatever_is_measured() {
     let mut estimate = MotorEstimate::new(&MotorPrior::default());
