@@ -18,6 +18,9 @@ pub const RECORD_LIMIT_BYTES: usize = 64 * 1024 * 1024;
 /// Metadata larger than this are passed over: their entries take far more memory than their bytes.
 pub const METADATA_LIMIT_BYTES: usize = 1024 * 1024;
 
+/// Position of a chunk's checksum in its body.
+const CHUNK_CHECKSUM_AT: usize = 24;
+
 /// A record begins with its type and its length.
 const HEAD_BYTES: usize = 9;
 
@@ -124,6 +127,8 @@ pub struct LogReader<R: Read> {
     /// Of everything before the end mark of the data.
     checksum: crc32fast::Hasher,
     saw_data_end: bool,
+    /// Every message so far is in a chunk with a checksum, or a checksum over all data follows.
+    is_checksummed: bool,
     /// Its messages are in chunks.
     is_chunked: bool,
     /// Messages so far.
@@ -145,6 +150,7 @@ impl<R: Read> LogReader<R> {
             channels: BTreeMap::new(),
             checksum: crc32fast::Hasher::new(),
             saw_data_end: false,
+            is_checksummed: true,
             is_chunked: false,
             messages: 0,
             is_counted: false,
@@ -178,6 +184,11 @@ impl<R: Read> LogReader<R> {
     /// records at the end are not detected.
     pub fn is_counted(&self) -> bool {
         self.is_counted
+    }
+
+    /// Returns whether a checksum covers every message: that of its chunk, or that of all data.
+    pub fn is_checksummed(&self) -> bool {
+        self.is_checksummed
     }
 
     /// Returns the next item; `None` at the end or at the first damage that cannot be passed over.
@@ -259,10 +270,15 @@ impl<R: Read> LogReader<R> {
         self.bytes_read += count as u64;
         let unpacked = if opcode == op::CHUNK { unpacked_bytes(body) } else { 0 };
         let mut damage = None;
+        self.is_checksummed &= match opcode {
+            op::CHUNK => body.get(CHUNK_CHECKSUM_AT..).is_some_and(|rest| !rest.starts_with(&[0; 4])),
+            _ => opcode != op::MESSAGE,
+        };
         if opcode == op::DATA_END && !self.saw_data_end {
             // A record between two chunks, or a complete chunk, may be damaged beyond recognition;
             // only this checksum shows that.
             let stored = body.first_chunk().map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            self.is_checksummed |= stored != 0;
             if stored != 0 && stored != self.checksum.clone().finalize() {
                 damage = Some("the checksum over all data does not fit");
             }

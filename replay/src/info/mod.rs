@@ -33,7 +33,6 @@ use crate::log::{
     Recording, RecordingError, RecordingReader, StampedEntry, Verdict, frame_of,
 };
 use crate::print::{beyond, counted, messages_lost};
-use crate::recover::scan::Records;
 
 /// Describes a log file. The flight computer is run again only if the vehicle's own findings do not
 /// suffice.
@@ -75,7 +74,7 @@ fn run_again(path: &Path, mut info: Info) -> Info {
 pub(crate) fn described(path: &Path) -> Result<Info, LogError> {
     let mut log = FlightLog::open(path)?;
     let mut info = info_of(&mut log)?;
-    info.note_file(path)?;
+    info.note_size(path);
     Ok(info)
 }
 
@@ -91,7 +90,7 @@ pub(crate) fn recorded(path: &Path) -> Result<(Info, Recording), RecordingError>
         reader.take(stamped, &log)?;
     }
     let mut info = seen.into_info(&log);
-    info.note_file(path)?;
+    info.note_size(path);
     Ok((info, reader.finish(&log)?))
 }
 
@@ -306,10 +305,8 @@ impl Info {
         }
     }
 
-    fn note_file(&mut self, path: &Path) -> Result<(), LogError> {
+    fn note_size(&mut self, path: &Path) {
         self.size_bytes = std::fs::metadata(path).ok().map(|metadata| metadata.len());
-        self.completeness.checksummed = Some(Records::open(path)?.is_checksummed()?);
-        Ok(())
     }
 
     /// The contact: as the vehicle reports it, else of its verdict.
@@ -440,8 +437,8 @@ pub struct Completeness {
     /// The log says how many records it has. Otherwise nothing shows that the last ones are
     /// missing.
     pub counted: bool,
-    /// A checksum covers every message; `None` of a log that was not read from a file.
-    pub checksummed: Option<bool>,
+    /// A checksum covers every message.
+    pub checksummed: bool,
     /// The last time that could be read, s after the first record.
     pub readable_until_s: Option<f64>,
     /// Messages missing before the last of their channel.
@@ -464,7 +461,7 @@ impl Completeness {
             complete: damage.is_none() && messages_lost == 0 && cut.is_none(),
             damage: damage.map(ToString::to_string),
             counted: log.is_counted(),
-            checksummed: None,
+            checksummed: log.is_checksummed(),
             readable_until_s: span.map(|span| span.duration_s),
             messages_lost,
             flights: log.flights.flown(),
@@ -573,10 +570,10 @@ impl Info {
     fn completeness(&self) -> String {
         let found = &self.completeness;
         if found.complete && found.counted {
-            let checksums = match found.checksummed {
-                Some(true) => "every checksum holds",
-                Some(false) => "but NO CHECKSUM protects all of its messages",
-                None => "no checksum fails",
+            let checksums = if found.checksummed {
+                "every checksum holds"
+            } else {
+                "but NO CHECKSUM protects all of its messages"
             };
             return format!("yes: ended properly, {checksums}");
         }

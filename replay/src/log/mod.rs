@@ -220,6 +220,11 @@ impl<R: Read> FlightLog<R> {
         self.reader.is_counted()
     }
 
+    /// Whether a checksum covers every message, as far as it was read.
+    pub fn is_checksummed(&self) -> bool {
+        self.reader.is_checksummed()
+    }
+
     /// The number of missing records, by the sequence numbers.
     pub fn messages_lost(&self) -> u64 {
         self.sequences.lost()

@@ -91,8 +91,9 @@ impl Recovery {
         faults.extend(self.lost.first().map(|lost| {
             let bytes: u64 = self.lost.iter().map(|lost| lost.bytes).sum();
             format!(
-                "{} stretches of {bytes} bytes are lost, the first from byte {}",
-                self.lost.len(),
+                "{} lost at {}, the first from byte {}",
+                counted(bytes, "byte"),
+                counted(self.lost.len() as u64, "position"),
                 lost.from_byte
             )
         }));

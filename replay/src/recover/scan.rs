@@ -20,6 +20,8 @@ use crate::log::{LogError, open_regular, take_magic};
 const HEAD_BYTES: usize = 9;
 /// A chunk's fields before its content, without the name of the compression.
 const CHUNK_FIELDS_BYTES: u64 = 40;
+/// Programs may define types of their own from this one on (MCAP specification, Records).
+const PRIVATE_FROM: u8 = 0x80;
 /// What is held at a time while the next chunk is looked for.
 const WINDOW_BYTES: usize = 1 << 20;
 /// More than the head and the fields of a chunk: the windows overlap by it.
@@ -98,23 +100,6 @@ impl Records {
         }
     }
 
-    /// Whether a checksum covers every message: that of its chunk, or that of all data.
-    pub(crate) fn is_checksummed(&mut self) -> Result<bool, LogError> {
-        let (mut at, mut every_chunk) = (mcap::MAGIC.len() as u64, true);
-        while let Some((opcode, length)) = self.head(at)?.filter(|(opcode, _)| *opcode != 0) {
-            let body = self.read(at + HEAD_BYTES as u64, 28)?;
-            let checksum = |place: usize| body.get(place..place + 4).is_some_and(|bytes| bytes != [0; 4]);
-            match opcode {
-                op::CHUNK => every_chunk &= checksum(24),
-                op::MESSAGE => every_chunk = false,
-                op::DATA_END => return Ok(every_chunk || checksum(0)),
-                _ => {}
-            }
-            at = at.saturating_add(HEAD_BYTES as u64).saturating_add(length);
-        }
-        Ok(every_chunk)
-    }
-
     /// Reads the whole file.
     pub(crate) fn contents(&mut self) -> Result<Contents, LogError> {
         let mut contents = Contents::default();
@@ -141,6 +126,13 @@ impl Records {
                 continue;
             }
             let next = end_of_head + length;
+            let fields =
+                if opcode == op::CHUNK { self.read(end_of_head, OVERLAP_BYTES as u64)? } else { Vec::new() };
+            if ChunkHead::read(&fields).is_some_and(|chunk| chunk.body_bytes != length) {
+                let reason = "a chunk whose length contradicts the length of its content";
+                at = self.skip(&mut contents, at, None, reason)?;
+                continue;
+            }
             if length > RECORD_LIMIT_BYTES as u64 {
                 let follows = self.begins_record(next)?;
                 let until = if follows { next } else { self.next_chunk(at + 1)?.unwrap_or(self.size) };
@@ -161,6 +153,11 @@ impl Records {
                 break;
             }
             match contents.check(opcode, &body) {
+                // No checksum protects the length of a record beside the chunks.
+                Ok(_) if opcode != op::CHUNK && self.hides_a_chunk(at, next)? => {
+                    let reason = "a record whose length reaches into the chunks behind it";
+                    at = self.skip(&mut contents, at, None, reason)?;
+                }
                 Ok(is_recovered) => {
                     hasher.update(&[opcode]);
                     hasher.update(&length.to_le_bytes());
@@ -238,7 +235,12 @@ impl Records {
         Ok(until)
     }
 
-    /// Whether a record that the format defines begins here and fits into the file; also the end of
+    /// Whether a chunk begins within a record, and none of any kind behind it: its length is wrong.
+    fn hides_a_chunk(&mut self, at: u64, next: u64) -> Result<bool, LogError> {
+        Ok(!self.begins_record(next)? && self.next_chunk(at + 1)?.is_some_and(|chunk| chunk < next))
+    }
+
+    /// Whether a record that the format permits begins here and fits into the file; also the end of
     /// the file.
     fn begins_record(&mut self, at: u64) -> Result<bool, LogError> {
         if at == self.size {
@@ -246,7 +248,8 @@ impl Records {
         }
         let head = self.head(at)?;
         Ok(head.is_some_and(|(opcode, length)| {
-            (op::HEADER..=op::DATA_END).contains(&opcode) && length <= self.size - at - HEAD_BYTES as u64
+            let is_permitted = (op::HEADER..=op::DATA_END).contains(&opcode) || opcode >= PRIVATE_FROM;
+            is_permitted && length <= self.size - at - HEAD_BYTES as u64
         }))
     }
 
