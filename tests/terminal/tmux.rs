@@ -84,5 +84,5 @@ fn a_screen_in_a_tmux_without_a_client_does_not_count() {
     let tmux = Tmux::attach_to(&pad);
     daemon.wait_for_line("at the controls: screen 1");
     tmux.run(&["detach-client"]);
-    daemon.wait_for_line("is not shown (tmux)");
+    daemon.wait_for_line("is not shown (tmux has no client)");
 }

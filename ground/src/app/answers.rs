@@ -14,7 +14,7 @@ use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -23,6 +23,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, isatty, tcgetattr, tcsetattr};
 
 use super::clock::since_boot;
+use crate::model::Silence;
 
 /// Device status report (ECMA-48, 8.3.35), which every terminal answers.
 pub(super) const QUESTION: &[u8] = b"\x1b[5n";
@@ -46,7 +47,7 @@ const TMUX_FORMAT: &str =
 static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 /// tmux reports that it does not show the screen.
-static HIDDEN: AtomicBool = AtomicBool::new(false);
+static HIDDEN: Mutex<Option<Silence>> = Mutex::new(None);
 
 /// The original standard input, and our end of the pseudo-terminal that replaces it.
 static REPLACED: Mutex<Option<(OwnedFd, File)>> = Mutex::new(None);
@@ -62,9 +63,9 @@ pub(super) fn answered_ago() -> Option<Duration> {
     Some(since_boot().saturating_sub(at))
 }
 
-/// Whether tmux shows another thing than this screen, or takes its keys.
-pub(super) fn is_hidden() -> bool {
-    HIDDEN.load(Ordering::Relaxed)
+/// Why tmux does not show this screen, or takes its keys.
+pub(super) fn hidden() -> Option<Silence> {
+    *HIDDEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Begins to stand between the terminal, which is in raw mode already, and crossterm, which has
@@ -142,18 +143,22 @@ fn query_tmux(pane: &OsStr) {
     while replaced().is_some() {
         let mut tmux = Command::new("tmux");
         tmux.args(["display-message", "-p", "-t"]).arg(pane).arg(TMUX_FORMAT).stdin(Stdio::null());
-        let is_hidden = tmux.output().is_ok_and(|output| does_tmux_hide(&output.stdout));
-        HIDDEN.store(is_hidden, Ordering::Relaxed);
+        let hidden = tmux.output().ok().and_then(|output| hidden_by_tmux(&output.stdout));
+        *HIDDEN.lock().unwrap_or_else(PoisonError::into_inner) = hidden;
         std::thread::sleep(QUERY_TMUX_EVERY);
     }
 }
 
-/// Whether an answer in [`TMUX_FORMAT`] shows that the pane is not shown, or takes no keys.
-fn does_tmux_hide(answer: &[u8]) -> bool {
+/// Why the pane is not shown or takes no keys, by an answer in [`TMUX_FORMAT`].
+fn hidden_by_tmux(answer: &[u8]) -> Option<Silence> {
     let words = str::from_utf8(answer).unwrap_or_default().split_whitespace();
     let numbers: Vec<u32> = words.filter_map(|word| word.parse().ok()).collect();
-    let [modes, clients, is_window_shown, is_covered] = numbers[..] else { return false };
-    modes > 0 || clients == 0 || is_window_shown == 0 || is_covered > 0
+    match numbers[..] {
+        [_, 0, _, _] => Some(Silence::TmuxWithoutClient),
+        [(1..), _, _, _] => Some(Silence::TmuxCopyMode),
+        [_, _, 0, _] | [_, _, _, (1..)] => Some(Silence::TmuxElsewhere),
+        _ => None,
+    }
 }
 
 /// Takes the answers out of a stream of bytes.
@@ -198,10 +203,16 @@ mod tests {
     #[test]
     fn a_pane_is_hidden_in_copy_mode_without_a_client_in_another_window_and_behind_a_zoomed_pane() {
         for shown in [&b"0 1 1 0\n"[..], b"0 2 1 0\n", b"", b"no server running", b"0 1\n"] {
-            assert!(!does_tmux_hide(shown), "{shown:?}");
+            assert_eq!(hidden_by_tmux(shown), None, "{shown:?}");
         }
-        for hidden in [&b"1 1 1 0\n"[..], b"2 1 1 0\n", b"0 0 1 0\n", b"0 1 0 0\n", b"0 1 1 1\n"] {
-            assert!(does_tmux_hide(hidden), "{hidden:?}");
+        for (hidden, why) in [
+            (&b"1 1 1 0\n"[..], Silence::TmuxCopyMode),
+            (b"2 1 1 0\n", Silence::TmuxCopyMode),
+            (b"0 0 1 0\n", Silence::TmuxWithoutClient),
+            (b"0 1 0 0\n", Silence::TmuxElsewhere),
+            (b"0 1 1 1\n", Silence::TmuxElsewhere),
+        ] {
+            assert_eq!(hidden_by_tmux(hidden), Some(why), "{hidden:?}");
         }
     }
 

@@ -22,7 +22,7 @@ use crate::config::Config;
 use crate::exit;
 use crate::exit::Exit;
 use crate::model::{
-    Action, CommandKind, Model, Request, Role, Seat, Settings, Talk, Unfinished, abort_stamp,
+    Action, CommandKind, Model, Request, Role, Seat, Settings, Silence, Talk, Unfinished, abort_stamp,
 };
 use crate::update::{Msg, update};
 
@@ -130,8 +130,9 @@ pub async fn session(
                 Vec::new()
             }
             _ = ticks.tick() => {
-                if output.answers(clock.now()) {
-                    link.send(&ToStation::Here).await;
+                let answer = output.answers(clock.now());
+                if answer != Err(Silence::NoAnswer) {
+                    link.send(&ToStation::Here(answer)).await;
                 }
                 output.pass(&mut model, clock.now());
                 update(&mut model, Msg::ScreenTick, times.theirs(clock.now()))

@@ -15,7 +15,7 @@ use serde_json::json;
 
 use super::screen::Screen;
 use crate::config::Config;
-use crate::model::{Ending, Event, FlightSoFar, Model, Speaker, Verdict};
+use crate::model::{Ending, Event, FlightSoFar, Model, Silence, Speaker, Verdict};
 use crate::update::{Action, Msg};
 use crate::view::headline;
 use crate::view::panels::limit_rows;
@@ -59,9 +59,9 @@ impl Output {
         }
     }
 
-    /// Whether the terminal has answered since the last call.
-    pub(super) fn answers(&mut self, now: Duration) -> bool {
-        self.screen.as_mut().is_some_and(|screen| screen.answers(now))
+    /// Whether a person can see the screen; see [`Screen::answers`].
+    pub(super) fn answers(&mut self, now: Duration) -> Result<(), Silence> {
+        self.screen.as_mut().map_or(Err(Silence::NoAnswer), |screen| screen.answers(now))
     }
 
     pub(super) fn mark_message(&mut self, msg: &Msg, model: &Model) {

@@ -33,7 +33,7 @@ use super::terminal::DiffBackend;
 use crate::cli::Characters;
 use crate::config::Config;
 use crate::key::Key;
-use crate::model::Model;
+use crate::model::{Model, Silence};
 use crate::update::Msg;
 use crate::view::Theme;
 
@@ -154,15 +154,24 @@ impl Screen {
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
-    /// Whether the terminal has answered since the last call, and shows this screen. Queries it
-    /// again if that is due, and if it has accepted the last frame.
-    pub fn answers(&mut self, now: Duration) -> bool {
+    /// Whether the terminal has answered since the last call, and shows this screen; else why a
+    /// person cannot see it. Queries it again if that is due, and if it has accepted the last
+    /// frame.
+    ///
+    /// # Errors
+    /// The screen does not count.
+    pub fn answers(&mut self, now: Duration) -> Result<(), Silence> {
         if now >= self.query_at && matches!(self.writer.is_busy(), Ok(false)) {
             self.query(now);
         }
         self.take_answer(now);
         let fits = self.terminal.size().is_ok_and(|size| size.width >= LEAST.0 && size.height >= LEAST.1);
-        std::mem::take(&mut self.has_answered) && fits && !answers::is_hidden()
+        match answers::hidden() {
+            _ if !std::mem::take(&mut self.has_answered) => Err(Silence::NoAnswer),
+            Some(why) => Err(why),
+            None if fits => Ok(()),
+            None => Err(Silence::TooSmall),
+        }
     }
 
     fn take_answer(&mut self, now: Duration) {

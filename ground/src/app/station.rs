@@ -25,7 +25,7 @@ use super::wire::Wire;
 use super::{files, programs, screen, stations};
 use crate::attach::{ToScreen, ToStation};
 use crate::demo::Demo;
-use crate::model::{BookLine, ChecklistEntry, LogHealth, Model, Seat, Settings, role_name};
+use crate::model::{BookLine, ChecklistEntry, LogHealth, Model, Seat, Settings, Silence, role_name};
 use crate::update::{Action, Msg, update};
 
 /// How often the end of the closed book is sent to the vehicle, because a frame may be lost.
@@ -90,6 +90,7 @@ pub(super) struct Answers {
     ever: bool,
     /// Ticks without an answer. A station that stood still has counted none meanwhile.
     silence: u8,
+    why: Silence,
 }
 
 impl Answers {
@@ -101,8 +102,12 @@ impl Answers {
         self.silence = self.silence.saturating_add(1);
     }
 
-    fn restart(&mut self) {
-        *self = Self { ever: true, silence: 0 };
+    fn note(&mut self, answer: Result<(), Silence>) {
+        match answer {
+            Ok(()) => *self = Self { ever: true, ..Self::default() },
+            Err(Silence::NoAnswer) => {}
+            Err(why) => self.why = why,
+        }
     }
 }
 
@@ -188,9 +193,7 @@ impl Station {
     fn count_silence(&mut self, now: Duration) {
         self.screens.iter_mut().for_each(|screen| screen.answers.tick());
         self.local_screen.tick();
-        if self.output.answers(now) {
-            self.local_screen.restart();
-        }
+        self.local_screen.note(self.output.answers(now));
     }
 
     /// Reports who can command, if that has changed.
@@ -202,7 +205,7 @@ impl Station {
         let (mut seats, mut silent) = (Vec::new(), Vec::new());
         for (seat, answers) in all {
             if answers.is_silent() {
-                silent.push(seat.clone());
+                silent.push((seat.clone(), answers.why));
             } else if answers.ever {
                 seats.push(seat.clone());
             }
@@ -253,8 +256,8 @@ impl Station {
             ServerEvent::FromScreen(by, ToStation::Request(request)) => {
                 return vec![Msg::Requested { request, by }];
             }
-            ServerEvent::FromScreen(by, ToStation::Here) => {
-                self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.restart());
+            ServerEvent::FromScreen(by, ToStation::Here(answer)) => {
+                self.screens.iter_mut().filter(|one| one.seat == by).for_each(|one| one.answers.note(answer));
             }
             ServerEvent::FromScreen(by, ToStation::Key(name)) => {
                 self.record_operator("key", &by.operator, format!("{name}{}", by.in_brackets()));

@@ -35,7 +35,7 @@ pub(super) fn of(model: &Model, screens: &[Attached]) -> StationStatus {
         false => "LIVE",
     };
     let watching = screens.iter().filter(|one| one.watch).map(|one| format!("{} (watches)", one.seat));
-    let silent = model.crew.silent().iter().map(|seat| format!("{seat} (does not answer)"));
+    let silent = model.crew.silent().iter().map(|(seat, why)| format!("{seat} ({why})"));
     let screens = model.crew.seats().iter().map(Seat::to_string).chain(silent).chain(watching);
     let Address { system_id, component_id } = settings.vehicle;
     StationStatus {

@@ -68,7 +68,7 @@ pub fn decode_to_station(bytes: &[u8]) -> Result<ToStation, CodecError> {
         }
         ToStation::Key(name) => *name = printable(name, KEY_MAX),
         ToStation::Request(Request::Note(text)) => *text = printable(text, NOTE_MAX),
-        ToStation::Status | ToStation::Request(_) | ToStation::Here => {}
+        ToStation::Status | ToStation::Request(_) | ToStation::Here(_) => {}
     }
     Ok(request)
 }
@@ -127,7 +127,7 @@ mod tests {
     use crate::key::Key;
     use crate::model::{
         AlarmKind, ChecklistEntry, CommandKind, Degrees, KeyOwner, LinkReport, LogHealth, LogSpace, Mark,
-        Request, Seat, Settings, Signature, parse_checklist,
+        Request, Seat, Settings, Signature, Silence, parse_checklist,
     };
 
     fn back(message: &ToScreen, now: Duration) -> (ToScreen, Duration) {
@@ -185,7 +185,7 @@ mod tests {
             },
             Msg::Received { bytes: 7, framing: FramerCounters { crc_errors: 8, ..Default::default() } },
             Msg::Log(LogHealth { dropped: 1, failed: true, removed: false, space }),
-            Msg::Crew { seats: vec![seat.clone()], silent: vec![Seat::default()] },
+            Msg::Crew { seats: vec![seat.clone()], silent: vec![(Seat::default(), Silence::TooSmall)] },
             Msg::Requested {
                 request: Request::Acknowledge(AlarmKind::Refused(CommandKind::Abort)),
                 by: seat,
@@ -254,7 +254,8 @@ mod tests {
             ToStation::Request(Request::Choose(4_242)),
             ToStation::Request(Request::Sign { step: 7, void: true }),
             ToStation::Key("Ctrl-X".to_owned()),
-            ToStation::Here,
+            ToStation::Here(Ok(())),
+            ToStation::Here(Err(Silence::TmuxCopyMode)),
         ];
         for request in requests {
             assert_eq!(decode_to_station(&encode_to_station(&request)[PREFIX_LEN..]), Ok(request));

@@ -11,13 +11,13 @@ pub mod socket;
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::{Request, Settings};
+use crate::model::{Request, Settings, Silence};
 use crate::update::Msg;
 
 // What a station and its screens say to each other.
 
 /// The version of the encoding. A program of another version is refused with an explanation.
-pub const VERSION: u32 = 17;
+pub const VERSION: u32 = 18;
 /// The longest name of an operator, in characters.
 pub(crate) const OPERATOR_MAX: usize = 40;
 
@@ -83,6 +83,7 @@ pub enum ToStation {
     Request(Request),
     /// A key was pressed; for the log.
     Key(String),
-    /// The screen's terminal answers. A screen without an answer for a second does not count.
-    Here,
+    /// The screen's terminal answers, and whether it shows the screen. A screen that is not seen
+    /// for a second does not count.
+    Here(Result<(), Silence>),
 }

@@ -18,12 +18,14 @@ pub const UNATTENDED_MAX: Duration = Duration::from_millis(800);
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Crew {
     seats: Vec<Seat>,
-    /// The screens that could command if they answered.
-    silent: Vec<Seat>,
+    /// The screens that could command if a person saw them.
+    silent: Vec<(Seat, Silence)>,
     /// When the last one left; `None` while one is there.
     absent_since: Option<Duration>,
     /// When the next hold is to be sent; `None` while no hold is needed.
     pub(crate) hold_due: Option<Duration>,
+    /// Why this station holds the countdown, until another one runs.
+    pub(crate) held_because: Option<String>,
     /// The event that a hold comes too late was reported.
     pub(crate) too_late_reported: bool,
 }
@@ -31,7 +33,7 @@ pub struct Crew {
 impl Crew {
     /// Sets the present seats, and the screens that do not answer: they have been silent for
     /// [`UNATTENDED_MAX`] already.
-    pub fn set_seats(&mut self, seats: Vec<Seat>, silent: Vec<Seat>, now: Duration) {
+    pub fn set_seats(&mut self, seats: Vec<Seat>, silent: Vec<(Seat, Silence)>, now: Duration) {
         if !seats.is_empty() {
             self.absent_since = None;
         } else if !silent.is_empty() {
@@ -46,7 +48,7 @@ impl Crew {
         &self.seats
     }
 
-    pub fn silent(&self) -> &[Seat] {
+    pub fn silent(&self) -> &[(Seat, Silence)] {
         &self.silent
     }
 
@@ -77,10 +79,43 @@ impl Crew {
         match &self.silent[..] {
             [] => there,
             silent => {
-                let why = "does not answer or is not shown (tmux), so it does not count";
-                format!("{there}; {why}: {}", listed(silent))
+                let each = silent.iter().map(|(seat, why)| format!("{seat} {why}")).collect::<Vec<_>>();
+                format!("{there}; does not count: {}", each.join("; "))
             }
         }
+    }
+
+    /// Why no screen counts, on the screen of `ours`; `None` if one does, or there is none.
+    pub(crate) fn silence(&self, ours: &Seat) -> Option<String> {
+        let (seat, why) = self.silent.first().filter(|_| self.seats.is_empty())?;
+        Some(if seat == ours { format!("this screen {why}") } else { format!("{seat} {why}") })
+    }
+}
+
+/// Why a screen does not count: no person can see it, or command at it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Silence {
+    /// The terminal answers no query.
+    #[default]
+    NoAnswer,
+    /// It has too few columns or rows.
+    TooSmall,
+    TmuxWithoutClient,
+    /// tmux shows the past of the pane, and takes the keys.
+    TmuxCopyMode,
+    /// tmux shows another window, or another pane that is zoomed.
+    TmuxElsewhere,
+}
+
+impl fmt::Display for Silence {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.write_str(match self {
+            Self::NoAnswer => "does not answer",
+            Self::TooSmall => "is too small",
+            Self::TmuxWithoutClient => "is not shown (tmux has no client)",
+            Self::TmuxCopyMode => "is not shown (tmux is in copy mode)",
+            Self::TmuxElsewhere => "is not shown (tmux shows another pane)",
+        })
     }
 }
 

@@ -298,7 +298,8 @@ fn held_by(vehicle: &Vehicle) -> Option<String> {
 }
 
 /// Why the countdown was held and what happens next; `None` while it is not held.
-pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
+pub fn hold_words(model: &Model) -> Option<String> {
+    let (vehicle, armed_here) = (&model.vehicle, model.link.uplink.armed_by_us);
     let status = &vehicle.status.as_ref()?.value;
     let theirs =
         || held_by(vehicle).map_or_else(|| "its station".to_owned(), |who| format!("the station of {who}"));
@@ -310,9 +311,10 @@ pub fn hold_words(vehicle: &Vehicle, armed_here: bool) -> Option<String> {
         TdHold::TD_HOLD_CHECK_FAILED => {
             vehicle.held_for().map_or_else(|| "a check of the vehicle fails".to_owned(), |(_, words)| words)
         }
-        TdHold::TD_HOLD_COMMANDED => {
-            format!("{} requested it", held_by(vehicle).unwrap_or_else(|| "a station".to_owned()))
-        }
+        TdHold::TD_HOLD_COMMANDED => match model.crew.held_because.clone().filter(|_| armed_here) {
+            Some(ours) => ours,
+            None => format!("{} requested it", held_by(vehicle).unwrap_or_else(|| "a station".to_owned())),
+        },
         TdHold::TD_HOLD_TAP_OVERDUE => {
             let whose = held_by(vehicle).map_or_else(String::new, |who| format!(" of {who}"));
             format!("no tap{whose} for 1 s")

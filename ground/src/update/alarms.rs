@@ -133,7 +133,7 @@ const OF_VEHICLE: [AlarmRow; 15] = [
         let away = KeepAway::of(&model.vehicle, now)?;
         matches!(away.danger, Danger::Live | Danger::LiveWaited).then(|| away.sentence())
     }),
-    of_boot(AlarmKind::Held, VEHICLE, |model, _| hold_words(&model.vehicle, model.link.uplink.armed_by_us)),
+    of_boot(AlarmKind::Held, VEHICLE, |model, _| hold_words(model)),
     of_boot(AlarmKind::Unfit, VEHICLE, |model, _| {
         model.vehicle.unfit_while_armed().map(|(_, words)| format!("ARMED, and NO-GO: {words}"))
     }),

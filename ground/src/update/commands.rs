@@ -10,8 +10,8 @@ use protocol::mission::MissionHash;
 
 use crate::model::{
     Acknowledgement, Action, AutoStep, CommandKind, CommandRow, Commands, LogFault, LogStanding, Model, Seat,
-    Speaker, TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat, why_not_seen,
-    why_not_start, why_not_take, why_nothing_moves, why_untested,
+    Settings, Speaker, TrackedCommand, why_not_arm, why_not_check, why_not_confirm, why_not_seat,
+    why_not_seen, why_not_start, why_not_take, why_nothing_moves, why_untested,
 };
 
 /// Of the many attempts of an abort, only the first and every n-th become an event.
@@ -463,10 +463,17 @@ const HOLD_EVERY: Duration = Duration::from_millis(100);
 /// Half of the tick period: ticks are not exact to the millisecond.
 const HALF_A_TICK: Duration = Duration::from_millis(50);
 
+/// Whether nobody can see and command the countdown. A simulated vehicle of this program endangers
+/// nobody.
+fn is_unattended(model: &Model, now: Duration) -> bool {
+    let Settings { auto, demonstration, .. } = model.settings;
+    !auto && !demonstration && model.crew.is_absent(now)
+}
+
 /// Why this station is unfit to command a countdown.
 fn why_unfit(model: &Model, now: Duration) -> Option<StationHold> {
     match model.unfit_log(now) {
-        _ if !model.settings.auto && model.crew.is_absent(now) => Some(StationHold::NoScreen),
+        _ if is_unattended(model, now) => Some(StationHold::NoScreen),
         _ if model.beside(now).is_some() && !model.boots.is_chosen(now) => Some(StationHold::TwoVehicles),
         None | Some((LogFault::Full, _)) => None,
         Some(_) => Some(StationHold::LogFails),
@@ -475,6 +482,9 @@ fn why_unfit(model: &Model, now: Duration) -> Option<StationHold> {
 
 pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
     let unfit = why_unfit(model, now);
+    if unfit.is_none() && counts_down(model) {
+        model.crew.held_because = None;
+    }
     let Some(why) = unfit.filter(|_| counts_down(model) && model.link.uplink.armed_by_us) else {
         if model.crew.hold_due.take().is_some() && !std::mem::take(&mut model.crew.too_late_reported) {
             let why = if unfit.is_some() { "the countdown has ended" } else { "its reason has ended" };
@@ -488,6 +498,8 @@ pub(super) fn hold_if_unfit(model: &mut Model, now: Duration) {
         let what = if too_late { "TOO LATE for a hold, only an abort ends it" } else { "HOLD" };
         let text = format!("{} in the countdown: {what}", why.words());
         model.log_act(now, "hold", &Seat::default(), EventLevel::Warning, text);
+        let unseen = model.crew.silence(&model.settings.seat).filter(|_| why == StationHold::NoScreen);
+        model.crew.held_because = Some(unseen.unwrap_or_else(|| why.words().to_owned()));
     }
     let due = model.crew.hold_due.unwrap_or(now);
     if too_late {

@@ -327,7 +327,7 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
         }
         Act::HoldCountdown if act.works(model, now) => open(model, Prompt::Hold, now),
         Act::HoldCountdown => {
-            let held = hold_words(&model.vehicle, model.link.uplink.armed_by_us);
+            let held = hold_words(model);
             let held = held.map(|words| words.replacen("HOLD", "HELD already", 1));
             model.info(now, held.unwrap_or_else(|| "no countdown runs".to_owned()));
         }

@@ -22,7 +22,7 @@ use crate::key::Key;
 pub use crate::model::{Action, Request};
 use crate::model::{
     BookState, Checklist, CommandKind, Degrees, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role,
-    Sample, Seat, Unfinished,
+    Sample, Seat, Silence, Unfinished,
 };
 
 /// The name of a signal, or of another reason to end.
@@ -39,7 +39,7 @@ pub enum Msg {
     Requested { request: Request, by: Seat },
     /// The seats that can command have changed: those at screens that answer, and at those that do
     /// not.
-    Crew { seats: Vec<Seat>, silent: Vec<Seat> },
+    Crew { seats: Vec<Seat>, silent: Vec<(Seat, Silence)> },
     /// The crew has quit the station's own screen while the vehicle was armed or in flight; the
     /// station keeps running.
     ScreenQuit,
@@ -137,7 +137,11 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Requested { request, by } => requests::on_request(model, request, by, now),
         Msg::Crew { seats, silent } => {
             model.crew.set_seats(seats, silent, now);
-            model.info(now, model.crew.words());
+            let words = model.crew.words();
+            match model.crew.silence(&model.settings.seat).filter(|_| model.settings.demonstration) {
+                Some(why) => model.warn(now, format!("{why}: simulated, so it flies")),
+                None => model.info(now, words),
+            }
         }
         Msg::Checklist(list) => model.checklist = Some(*list),
         Msg::Report(Ok(path)) => model.info(now, format!("the report is written: {path}")),

@@ -196,7 +196,7 @@ pub(super) fn on_change(model: &mut Model, before: &Announced, after: &Announced
         on_verdict(model, &verdict, now);
     }
     if after.hold != before.hold
-        && let Some(text) = hold_words(&model.vehicle, model.link.uplink.armed_by_us)
+        && let Some(text) = hold_words(model)
     {
         model.error(now, text);
         model.outbox.push(Action::SyncLog);

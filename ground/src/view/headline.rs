@@ -139,7 +139,7 @@ fn pad_word(model: &Model, now: Duration) -> (String, TextRole) {
     let at_work = model.rebooted.is_some_and(|(did, _)| !did.is_empty());
     match readiness(model, now) {
         _ if !is_on_pad(status.value.phase) => word("FLIGHT", TextRole::Title),
-        _ if hold_words(vehicle, model.link.uplink.armed_by_us).is_some() => word("HOLD", TextRole::Alarm),
+        _ if hold_words(model).is_some() => word("HOLD", TextRole::Alarm),
         _ if taps => word("TAP", TextRole::Alarm),
         _ if let Some(left) = left => (format!("T-{}", super::fixed(left.value, 1)), TextRole::Title),
         _ if vehicle.unfit_while_armed().is_some() => word("NO-GO", TextRole::Alarm),

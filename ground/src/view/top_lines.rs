@@ -495,7 +495,7 @@ pub fn message(model: &Model, theme: Theme, now: Duration, columns: usize) -> Op
         !answered || !is_past(track.acknowledged_at.unwrap_or(track.commanded_at))
     };
     let facts = |track| command_facts(track, columns, theme, now);
-    let hold = || hold_words(&model.vehicle, model.link.uplink.armed_by_us);
+    let hold = || hold_words(model);
     hands_off(model, theme, now)
         .or_else(|| latest.filter(is_open).map(facts))
         .or_else(|| hold().map(|words| theme.line(words, TextRole::Alarm)))

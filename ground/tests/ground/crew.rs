@@ -2,9 +2,9 @@
 //! commanding screen.
 
 use ground::key::Key;
-use ground::model::{CommandKind, Seat, Settings};
+use ground::model::{CommandKind, Seat, Settings, Silence};
 use ground::update::{Action, Msg};
-use protocol::dialect::{MavCmd, TdPhase};
+use protocol::dialect::{MavCmd, TdHold, TdPhase};
 use protocol::log::record::Record;
 
 use crate::keys::ladder;
@@ -161,13 +161,19 @@ fn after_the_last_moment_no_hold_is_sent_and_that_is_reported() {
 #[test]
 fn a_countdown_whose_only_screen_does_not_answer_is_held_at_once() {
     let mut rig = counting();
-    rig.msg(Msg::Crew { seats: Vec::new(), silent: vec![anna()] });
+    rig.msg(Msg::Crew { seats: Vec::new(), silent: vec![(anna(), Silence::TmuxWithoutClient)] });
     rig.run(0.1);
     assert!(holds(&mut rig) > 0);
-    rig.expect_event("does not answer or is not shown (tmux), so it does not count: screen 1, anna");
+    let why = "screen 1, anna on pts/3 is not shown (tmux has no client)";
+    rig.expect_event(&format!("does not count: {why}"));
+    // The largest line gives the station's reason.
+    rig.hold = TdHold::TD_HOLD_COMMANDED;
+    rig.countdown_ms = i32::MAX;
+    rig.run(0.5);
+    rig.expect_screen("HOLD: this screen is not shown (tmux has no client); start again");
     // Somebody else who answers is enough.
     let mut rig = counting();
-    rig.msg(Msg::Crew { seats: vec![ben()], silent: vec![anna()] });
+    rig.msg(Msg::Crew { seats: vec![ben()], silent: vec![(anna(), Silence::NoAnswer)] });
     rig.run(5.0);
     assert_eq!(holds(&mut rig), 0);
 }

@@ -207,7 +207,7 @@ fn of_the_station(
 /// Whether the checks pass, in words.
 fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
-    let held = hold_words(&model.vehicle, model.link.uplink.armed_by_us);
+    let held = hold_words(model);
     let unfit = model.vehicle.unfit_while_armed().map(|(_, words)| format!("ARMED, and NO-GO: {words}"));
     match model.vehicle.status.as_ref() {
         Some(_) if held.is_some() || unfit.is_some() => (held.or(unfit).unwrap_or_default(), TextRole::Alarm),
