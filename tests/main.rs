@@ -13,6 +13,7 @@ mod hold;
 mod hostile;
 mod launch_day;
 mod links;
+mod log_states;
 mod logs;
 mod outside_clients;
 mod pad_check;

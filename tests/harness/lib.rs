@@ -10,6 +10,7 @@ mod bare_ground;
 mod flight;
 mod keys;
 mod log_file;
+mod log_states;
 mod ports;
 mod process;
 mod programs;
@@ -27,6 +28,7 @@ pub use flight::{
 };
 pub use keys::{keygen, signing_with_key_in};
 pub use log_file::{frames_of, raw_frames_of};
+pub use log_states::{LogState, log_states};
 pub use nix::sys::signal::Signal;
 pub use ports::{Bound, unshared_address};
 pub use process::{Ended, Running, resident_bytes, status_of};

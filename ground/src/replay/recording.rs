@@ -84,12 +84,15 @@ impl Recording {
             framer.push(&start);
             let is_log = matches!(events.format, Format::Tlog(_)) || start.starts_with(b"\x89MCAP");
             let is_stream = !is_log && framer.next_frame().is_some();
-            let why = if is_stream {
-                "is a MAVLink stream without times; a .tlog has one before each frame"
-            } else {
-                "contains no frames of a vehicle; is it a log of `ground` or `onboard-sim`?"
-            };
-            anyhow::bail!("{shown}: {why}");
+            let none = "contains no frames of a vehicle";
+            match events.damage() {
+                _ if is_stream => anyhow::bail!(
+                    "{shown}: is a MAVLink stream without times; a .tlog has one before each frame"
+                ),
+                _ if start.is_empty() => anyhow::bail!("{shown}: is empty"),
+                Some(damage) => anyhow::bail!("{shown}: {none}: it is damaged: {damage}"),
+                None => anyhow::bail!("{shown}: {none}; is it a log of `ground` or `onboard-sim`?"),
+            }
         };
         let Survey { events: count, length, mut phases, reported, pad, .. } = survey;
         reported.date(&mut phases);

@@ -70,7 +70,9 @@ pub enum Damage {
     #[error("not an MCAP file: its first bytes are not the MCAP magic")]
     NotMcap,
     /// The file ends without an end mark: its recorder was killed, or it was cut.
-    #[error("ends after {bytes} bytes without an end mark: the recorder was stopped, or the file was cut")]
+    #[error(
+        "ends after {bytes} bytes without an end mark: the recorder still writes or was stopped, or the file was cut"
+    )]
     Truncated { bytes: u64 },
     /// A record cannot be parsed.
     #[error("unreadable near byte {near_byte}: {reason}")]
@@ -286,6 +288,10 @@ impl<R: Read> LogReader<R> {
             self.checksum.update(record);
         }
         self.is_chunked |= opcode == op::CHUNK;
+        if count == length && !fields_fit(opcode, body) {
+            self.finish(Some(self.corrupt(TOO_SHORT)));
+            return Ok(());
+        }
         if unpacked > RECORD_LIMIT_BYTES as u64 {
             self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes: unpacked });
         } else if opcode == op::MESSAGE && self.is_chunked {
@@ -320,7 +326,10 @@ impl<R: Read> LogReader<R> {
             }
         }
         if left > 0 {
-            self.finish(Some(self.corrupt("a record that is longer than the rest of the file")));
+            // A recorder does not know the length of a chunk before it ends.
+            let is_open = bytes == u64::MAX;
+            let longer = "a record that is longer than the rest of the file";
+            self.finish(Some(if is_open { self.cut() } else { self.corrupt(longer) }));
         } else if head.first() != Some(&op::ATTACHMENT) {
             self.note(Damage::TooLarge { near_byte: self.bytes_read, bytes });
         }
@@ -469,9 +478,11 @@ fn with_causes(error: &mcap::McapError) -> String {
 /// # Errors
 /// The body does not fit the type.
 pub fn parse_record(opcode: u8, data: &[u8]) -> mcap::McapResult<McapRecord<'_>> {
-    // The parser of the crate `mcap` panics if an attachment is too short for its fields.
-    if opcode == op::ATTACHMENT && !attachment_fits(data) {
-        return Err(mcap::McapError::BadAttachmentLength { header: 0, available: data.len() as u64 });
+    // The parser of the crate `mcap` panics if an attachment is too short for its fields, and takes
+    // the memory for a text before it reads it: up to 4 GB.
+    if !fields_fit(opcode, data) {
+        let error = std::io::Error::new(std::io::ErrorKind::InvalidData, TOO_SHORT);
+        return Err(mcap::McapError::Io(error));
     }
     mcap::parse_record(opcode, data)
 }
@@ -509,15 +520,39 @@ pub fn records_of_chunk(
     Ok(())
 }
 
-/// Returns whether an attachment has room for two times, two length-prefixed strings, the length of
-/// its data and a checksum.
-fn attachment_fits(data: &[u8]) -> bool {
-    const TIMES_BYTES: usize = 16;
-    const DATA_LENGTH_AND_CHECKSUM_BYTES: usize = 12;
-    fn behind_string(rest: &[u8]) -> Option<&[u8]> {
+/// Why a record cannot be parsed.
+const TOO_SHORT: &str = "a record that is too short for its fields";
+
+/// Whether a record of the data has room for its texts: behind fields of a fixed size so many,
+/// each with its length, then perhaps a map of texts, then the rest (MCAP specification, Records).
+fn fields_fit(opcode: u8, data: &[u8]) -> bool {
+    fn behind_text(rest: &[u8]) -> Option<&[u8]> {
         let length = u32::from_le_bytes(*rest.first_chunk()?);
         rest.get(usize::try_from(length).ok()?.checked_add(4)?..)
     }
-    let behind_strings = data.get(TIMES_BYTES..).and_then(behind_string).and_then(behind_string);
-    behind_strings.is_some_and(|rest| rest.len() >= DATA_LENGTH_AND_CHECKSUM_BYTES)
+    let (fixed, texts, has_map, rest) = match opcode {
+        op::HEADER => (0, 2, false, 0),
+        op::SCHEMA => (2, 2, false, 4),
+        op::CHANNEL => (4, 2, true, 0),
+        op::CHUNK => (28, 1, false, 8),
+        // Size of the data, and checksum.
+        op::ATTACHMENT => (16, 2, false, 12),
+        op::ATTACHMENT_INDEX => (40, 2, false, 0),
+        op::METADATA => (0, 1, true, 0),
+        op::METADATA_INDEX => (16, 1, false, 0),
+        _ => return true,
+    };
+    let mut left = data.get(fixed..);
+    for _ in 0..texts {
+        left = left.and_then(behind_text);
+    }
+    let Some(left) = left.filter(|left| left.len() >= rest) else { return false };
+    let Some(mut map) = has_map.then(|| behind_text(left).map(|behind| &left[4..left.len() - behind.len()]))
+    else {
+        return true;
+    };
+    while let Some(pairs) = map.filter(|pairs| !pairs.is_empty()) {
+        map = behind_text(pairs).and_then(behind_text);
+    }
+    map.is_some()
 }

@@ -38,7 +38,9 @@ const FOOTER_CHECKED_BYTES: usize = 16;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Good {
     /// Position of its first byte in the file.
-    pub(crate) at: u64,
+    at: u64,
+    /// Length of its body.
+    length: u64,
     pub(crate) opcode: u8,
 }
 
@@ -92,12 +94,9 @@ impl Records {
         Ok(Self { name, input, size })
     }
 
-    /// The body of the record that begins at this byte.
-    pub(crate) fn body(&mut self, at: u64) -> Result<Vec<u8>, LogError> {
-        match self.head(at)? {
-            Some((_, length)) => self.read(at + HEAD_BYTES as u64, length),
-            None => Ok(Vec::new()),
-        }
+    /// The body of a record.
+    pub(crate) fn body(&mut self, good: &Good) -> Result<Vec<u8>, LogError> {
+        self.read(good.at + HEAD_BYTES as u64, good.length)
     }
 
     /// Reads the whole file.
@@ -108,7 +107,7 @@ impl Records {
         let mut at = mcap::MAGIC.len() as u64;
         while at < self.size {
             let end_of_head = at + HEAD_BYTES as u64;
-            let Some((opcode, length)) = self.head(at)? else {
+            let Some((opcode, stated)) = self.head(at)? else {
                 contents.lose(at, self.size - at, None, "ends inside a record");
                 break;
             };
@@ -116,6 +115,10 @@ impl Records {
                 contents.lose(at, self.size - at, None, "more records than any log has");
                 break;
             }
+            // The sizes in a chunk's fields; if they are wrong, its content contradicts its checksum.
+            let fields = if opcode == op::CHUNK { OVERLAP_BYTES as u64 } else { 0 };
+            let fields = ChunkHead::read(&self.read(end_of_head, fields)?);
+            let length = fields.map_or(stated, |chunk| chunk.body_bytes);
             if opcode == 0 || length > self.size - end_of_head {
                 let reason = if opcode == 0 {
                     "no record begins here"
@@ -126,13 +129,6 @@ impl Records {
                 continue;
             }
             let next = end_of_head + length;
-            let fields =
-                if opcode == op::CHUNK { self.read(end_of_head, OVERLAP_BYTES as u64)? } else { Vec::new() };
-            if ChunkHead::read(&fields).is_some_and(|chunk| chunk.body_bytes != length) {
-                let reason = "a chunk whose length contradicts the length of its content";
-                at = self.skip(&mut contents, at, None, reason)?;
-                continue;
-            }
             if length > RECORD_LIMIT_BYTES as u64 {
                 let follows = self.begins_record(next)?;
                 let until = if follows { next } else { self.next_chunk(at + 1)?.unwrap_or(self.size) };
@@ -163,7 +159,11 @@ impl Records {
                     hasher.update(&length.to_le_bytes());
                     hasher.update(&body);
                     if is_recovered {
-                        contents.good.push(Good { at, opcode });
+                        contents.good.push(Good { at, length, opcode });
+                    }
+                    if length != stated {
+                        let reason = "the length of a chunk is wrong; its content is intact";
+                        contents.lose(at, HEAD_BYTES as u64, None, reason);
                     }
                     at = next;
                 }

@@ -110,7 +110,7 @@ impl<'a> Rescue<'a> {
 
     fn add_all(&mut self, records: &mut Records) -> Result<(), RecoverError> {
         for piece in &self.contents.good {
-            let body = records.body(piece.at)?;
+            let body = records.body(piece)?;
             self.add(piece.opcode, &body)?;
         }
         Ok(())

@@ -41,6 +41,7 @@ impl FlownPath {
         let (mut info, recording) = recorded(file)?;
         let mission = from_toml(recording.profile_toml()?, "profile.toml")
             .with_context(|| file.display().to_string())?;
+        info.completeness.warn(&info.file);
         let first_ns = info.span.map_or(0, |span| span.first_ns);
         let zero_s = recording.clocks.flight_zero_s.unwrap_or(0.0);
         let flight = Flight::of(recording, &mut info);

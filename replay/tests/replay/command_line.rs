@@ -88,24 +88,6 @@ fn a_divergence_exits_1_with_both_values_and_bits() {
     }
 }
 
-#[test]
-fn a_cut_log_exits_0_with_a_warning() {
-    let files = Files::new();
-    let (at, frames) = COMPLETE.synced[4];
-    let file = files.file(&COMPLETE.bytes[..usize::try_from(at).unwrap() + 5]);
-    for question in ["verify", "info"] {
-        let (code, _, stderr) = run(&mut replay(question, &file));
-        assert!(code == 0 && stderr.contains("warning"), "{stderr}");
-    }
-    let (_, report) = data(&mut replay("verify", &file));
-    assert_eq!(
-        (&report["outcome"], &report["frames_identical"]),
-        (&"identical-readable-part".into(), &frames.into())
-    );
-    let (_, info) = data(&mut replay("info", &file));
-    assert_eq!(info["completeness"]["complete"], false);
-}
-
 /// What is lost behind that is for `recover`.
 #[test]
 fn a_log_broken_in_the_middle_states_until_when_it_was_read() {

@@ -28,6 +28,7 @@ mod in_order;
 mod lacking;
 mod layouts;
 mod limits;
+mod log_states;
 mod lost_frames;
 mod lost_samples;
 mod missions;

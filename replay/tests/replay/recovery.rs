@@ -11,10 +11,9 @@ use protocol::log::reader::Damage;
 use replay::info::info;
 use replay::log::{FlightLog, Recording};
 use replay::recover::recover;
-use replay::verify::{Verification, verify};
 
 use crate::command_line::{replay, run};
-use crate::flown::{COMPLETE, FRAME_S, only};
+use crate::flown::COMPLETE;
 use crate::from_apogee::LANDED;
 use crate::simulated::DISPERSED;
 use crate::tampered::Held;
@@ -26,23 +25,6 @@ fn recovered(bytes: &[u8], directory: &Path) -> Option<(replay::recover::Recover
     std::fs::write(&input, bytes).unwrap();
     let recovery = recover(&input, &output).ok()?;
     Some((recovery, Recording::open(&output).ok()?))
-}
-
-/// The log of a killed recorder: everything that was synced, and the result is a whole log.
-#[test]
-fn a_cut_log_recovers_what_was_synced() {
-    let directory = tempfile::tempdir().unwrap();
-    for (at, frames) in &COMPLETE.synced[..COMPLETE.synced.len() - 1] {
-        let cut = &COMPLETE.bytes[..usize::try_from(*at).unwrap() + 3];
-        let (recovery, again) = recovered(cut, directory.path()).unwrap();
-        assert_eq!(again.frames.len(), *frames, "cut after {at}");
-        assert!(!recovery.ended);
-        assert!(again.damage.is_some(), "the recovered log says so");
-        let verified = only(verify(&directory.path().join("out.mcap")).unwrap());
-        // Data that was not yet on the disk is missing, although no checksum shows it any more.
-        assert_eq!(verified.outcome, Verification::IdenticalReadablePart);
-        assert_eq!((verified.frames_identical, verified.cut.unwrap().contact_s), (*frames as u64, None));
-    }
 }
 
 /// A number in the summary is accepted only under the summary's checksum.
@@ -125,35 +107,6 @@ fn a_log_cut_at_any_byte_behind_its_chunks_loses_no_message() {
         assert!(code == 0 && stdout.contains("DAMAGED: "), "{stdout}");
         std::fs::remove_file(&output).unwrap();
     }
-}
-
-/// One broken chunk loses only itself, and its position is reported.
-#[test]
-fn chunks_after_a_broken_chunk_are_recovered() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut bytes = COMPLETE.bytes.clone();
-    let (at, before) = COMPLETE.synced[3];
-    bytes[usize::try_from(at).unwrap() + 200] ^= 0x10;
-    let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
-    let all = COMPLETE.synced.last().unwrap().1;
-    assert_eq!(again.frames.len(), all - 5, "{recovery:?}");
-    assert_eq!(again.frames_unbroken, before);
-    assert_eq!(recovery.lost.len(), 1);
-    let (from_s, until_s) = recovery.lost[0].span_s.unwrap();
-    let first_s = (before + 1) as f64 * FRAME_S;
-    assert!((from_s - first_s).abs() < 1e-6 && (until_s - from_s - 4.0 * FRAME_S).abs() < 1e-6);
-}
-
-/// The length of a record is broken: the next chunk is found by what it looks like.
-#[test]
-fn after_a_broken_length_the_next_chunk_is_found() {
-    let directory = tempfile::tempdir().unwrap();
-    let mut bytes = COMPLETE.bytes.clone();
-    let (at, before) = COMPLETE.synced[3];
-    bytes[usize::try_from(at).unwrap() + 8] = 0x7f;
-    let (recovery, again) = recovered(&bytes, directory.path()).unwrap();
-    assert!(again.frames.len() > before, "{recovery:?}");
-    assert!(recovery.ended && recovery.lost.len() == 1, "{recovery:?}");
 }
 
 /// What a log holds: topic, time, number and bytes of each message.
