@@ -137,6 +137,14 @@ impl Terminal {
         }
     }
 
+    /// Types these keys with this pause before each.
+    pub fn type_slowly(&mut self, keys: &[u8], interval: Duration) {
+        for key in keys {
+            pause(interval);
+            self.type_bytes(&[*key]);
+        }
+    }
+
     /// Types these keys repeatedly until the words are shown; returns how often. On a busy machine
     /// keys may arrive together, and the program prompts whether a person typed them: this confirms
     /// it.

@@ -8,6 +8,7 @@ mod attached_screens;
 mod bad_link;
 mod endings;
 mod escape_sequences;
+mod every_key;
 mod hung_screens;
 mod pasted_keys;
 mod reboot;

@@ -14,7 +14,7 @@ use std::io::{Read as _, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
@@ -45,6 +45,10 @@ const TMUX_FORMAT: &str =
 /// When the last answer arrived that was not taken yet, and the number of open queries. There is
 /// only one terminal.
 static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
+/// Asks whether the terminal can distinguish a held key's repeats from presses (kitty's keyboard
+/// protocol, "Detection of support for this protocol"). crossterm drops the answer.
+pub(super) const FLAGS_QUESTION: &[u8] = b"\x1b[?u";
+static KNOWS_FLAGS: AtomicBool = AtomicBool::new(false);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 /// tmux reports that it does not show the screen.
 static HIDDEN: Mutex<Option<Silence>> = Mutex::new(None);
@@ -61,6 +65,11 @@ pub(super) fn note_question() {
 pub(super) fn answered_ago() -> Option<Duration> {
     let at = ANSWERED.lock().unwrap_or_else(PoisonError::into_inner).take()?;
     Some(since_boot().saturating_sub(at))
+}
+
+/// Whether the terminal has answered [`FLAGS_QUESTION`].
+pub(super) fn knows_flags() -> bool {
+    KNOWS_FLAGS.load(Ordering::Relaxed)
 }
 
 /// Why tmux does not show this screen, or takes its keys.
@@ -166,6 +175,8 @@ fn hidden_by_tmux(answer: &[u8]) -> Option<Silence> {
 struct Sieve {
     /// How many bytes of an answer were the last ones.
     begun: usize,
+    /// The same of the answer to [`FLAGS_QUESTION`], which begins as that and then has a number.
+    flags: usize,
 }
 
 impl Sieve {
@@ -173,6 +184,16 @@ impl Sieve {
     fn pass(&mut self, bytes: &[u8]) -> Vec<u8> {
         let mut rest = Vec::with_capacity(bytes.len());
         for byte in bytes {
+            self.flags = match (self.flags, byte) {
+                (_, 0x1b) => 1,
+                (1, b'[') => 2,
+                (2, b'?') | (3, b'0'..=b'9') => 3,
+                (3, b'u') => {
+                    KNOWS_FLAGS.store(true, Ordering::Relaxed);
+                    0
+                }
+                _ => 0,
+            };
             if ANSWER[self.begun] != *byte {
                 rest.extend(self.give_up());
             }

@@ -69,7 +69,6 @@ pub async fn session(
         print(LINES_ONLY)?;
     }
     let mut output = Output::open(interactive, config)?;
-    model.repeats_reported = output.reports_repeats();
     let mut ticks = interval(TICK);
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     let mut look_again_at: Option<Duration> = None;
@@ -122,7 +121,6 @@ pub async fn session(
                     model = Model::new(settings(&Hello::default(), viewer));
                     model.pages = pages;
                     model.link.abort_unsent = abort_unsent;
-                    model.repeats_reported = output.reports_repeats();
                     output.lines = Lines::default();
                     output.mark_changed();
                     look_again_at = None;

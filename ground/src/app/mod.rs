@@ -298,7 +298,6 @@ async fn start(
     restore_unfinished(&mut model, recorder.as_ref(), clock.now());
     let server = serve(args, &mut model, duty, &clock).await?;
     let output = if json { Output::lines(Lines::closed()) } else { Output::open(interactive, config)? };
-    model.repeats_reported = output.reports_repeats();
     let mut station = Station {
         model,
         wire,

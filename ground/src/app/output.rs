@@ -42,11 +42,6 @@ impl Output {
         Self { screen: None, lines }
     }
 
-    /// Whether the terminal distinguishes a held key's repeats from presses.
-    pub(super) fn reports_repeats(&self) -> bool {
-        self.screen.as_ref().is_some_and(|screen| screen.reports_repeats())
-    }
-
     pub(super) fn redraw_at(&self) -> Option<Duration> {
         self.screen.as_ref().map(|screen| screen.pace.redraw_at())
     }
@@ -94,7 +89,8 @@ impl Output {
     }
 
     /// Lets time pass for the model's view of the terminal.
-    pub(super) fn pass(&self, model: &mut Model, now: Duration) {
+    pub(super) fn pass(&mut self, model: &mut Model, now: Duration) {
+        model.repeats_reported = self.screen.as_mut().is_some_and(|screen| screen.reports_repeats());
         model.screen_late = self.screen.as_ref().map_or(Duration::ZERO, |screen| screen.pace.late(now));
     }
 

@@ -18,7 +18,6 @@ use crossterm::event::{
 };
 use crossterm::terminal::{
     Clear, ClearType, EnterAlternateScreen, LeaveAlternateScreen, disable_raw_mode, enable_raw_mode,
-    supports_keyboard_enhancement,
 };
 use crossterm::{execute, queue};
 use ratatui::Terminal;
@@ -36,6 +35,7 @@ use crate::key::Key;
 use crate::model::{Model, Silence};
 use crate::update::Msg;
 use crate::view::Theme;
+use crate::view::theme::Depth;
 
 /// The most keys passed on at once, so that a paste does not delay link and clock.
 const TOGETHER_MAX: usize = 1_024;
@@ -149,8 +149,17 @@ impl Screen {
         self.voice.take_if(|voice| !voice.call_out(text)).is_some()
     }
 
-    /// Whether the terminal distinguishes a held key's repeats from presses.
-    pub fn reports_repeats(&self) -> bool {
+    /// Whether the terminal distinguishes a held key's repeats from presses. It is asked to as soon
+    /// as it has answered that it can: some terminals answer nothing, and none is waited for.
+    pub fn reports_repeats(&mut self) -> bool {
+        if answers::knows_flags() && !KEYBOARD_ENHANCED.swap(true, Ordering::Relaxed) {
+            // Event types need escape codes; without the first flag Ctrl-X would stay a single byte.
+            let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
+                | KeyboardEnhancementFlags::REPORT_EVENT_TYPES;
+            // Writing to a buffer in memory cannot fail.
+            let _ = queue!(self.terminal.backend_mut().terminal, PushKeyboardEnhancementFlags(flags));
+            self.writer.send();
+        }
         KEYBOARD_ENHANCED.load(Ordering::Relaxed)
     }
 
@@ -283,13 +292,13 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
     answers::begin()?;
     // Some terminals have no alternate screen, and still show the earlier content.
     execute!(io::stdout(), EnterAlternateScreen, Clear(ClearType::All), EnableBracketedPaste)?;
-    request_repeat_reports()?;
+    io::Write::write_all(&mut io::stdout(), answers::FLAGS_QUESTION)?;
+    io::Write::flush(&mut io::stdout())?;
     let (writer, buffer) = TerminalWriter::new()?;
     let mut backend = DiffBackend::new(CrosstermBackend::new(buffer));
     // GNU Screen sets it.
     backend.erases = std::env::var_os("STY").is_none();
-    backend.has_true_colour =
-        std::env::var("COLORTERM").is_ok_and(|colours| ["truecolor", "24bit"].contains(&colours.as_str()));
+    backend.depth = Depth::of_environment(|name| std::env::var(name).ok());
     Ok((Terminal::new(backend)?, writer))
 }
 
@@ -298,18 +307,6 @@ fn take_terminal() -> io::Result<(Terminal<DiffBackend<FrameBuffer>>, TerminalWr
 fn is_answered_by_another() -> bool {
     let is_set = |name: &&str| std::env::var_os(name).is_some();
     ["TMUX", "STY"].iter().any(is_set) && is_set(&"SSH_CONNECTION")
-}
-
-/// Requests that the terminal distinguishes a held key's repeats from presses, if it supports that.
-fn request_repeat_reports() -> io::Result<()> {
-    if supports_keyboard_enhancement().unwrap_or(false) {
-        // Event types need escape codes; without the first flag Ctrl-X would stay a single byte.
-        let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
-            | KeyboardEnhancementFlags::REPORT_EVENT_TYPES;
-        KEYBOARD_ENHANCED.store(true, Ordering::Relaxed);
-        execute!(io::stdout(), PushKeyboardEnhancementFlags(flags))?;
-    }
-    Ok(())
 }
 
 /// Restores the terminal. It may be gone (a dropped session); then errors are ignored, because

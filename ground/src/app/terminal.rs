@@ -16,14 +16,13 @@ use ratatui::layout::{Position, Size};
 use ratatui::style::{Color, Modifier};
 use rustix::termios::tcgetwinsize;
 
-use crate::view::theme::true_colour;
+use crate::view::theme::Depth;
 
 /// ratatui's own backend, except for the cells.
 #[derive(Debug)]
 pub struct DiffBackend<W: Write> {
     pub terminal: CrosstermBackend<W>,
-    /// Whether the terminal shows colours of 24 bits.
-    pub has_true_colour: bool,
+    pub depth: Depth,
     /// The rightmost column that was drawn since the screen was cleared. Behind the last one of the
     /// terminal the cursor stands where it likes.
     rightmost: u16,
@@ -34,7 +33,7 @@ pub struct DiffBackend<W: Write> {
 
 impl<W: Write> DiffBackend<W> {
     pub fn new(terminal: CrosstermBackend<W>) -> Self {
-        Self { terminal, has_true_colour: false, rightmost: 0, cursor_is_hidden: false, erases: true }
+        Self { terminal, depth: Depth::default(), rightmost: 0, cursor_is_hidden: false, erases: true }
     }
 }
 
@@ -45,6 +44,9 @@ const MODIFIERS: [(Modifier, u8, u8); 3] =
 /// The codes of a colour; `base` is 30 for letters and 40 for the background.
 fn codes(colour: Color, base: u8) -> Vec<u8> {
     match colour {
+        // The first eight, and the eight bright ones (ECMA-48, SGR; aixterm).
+        Color::Indexed(number @ 0..8) => vec![base + number],
+        Color::Indexed(number @ 8..16) => vec![base + 60 + number - 8],
         Color::Indexed(number) => vec![base + 8, 5, number],
         Color::Rgb(red, green, blue) => vec![base + 8, 2, red, green, blue],
         Color::Black => vec![base],
@@ -104,10 +106,11 @@ impl Run {
 
 /// The cells as runs, from row to row. Blanks belong to the letters beside them, whatever colour
 /// these have.
-fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, shown: fn(Color) -> Color) -> Vec<Run> {
+fn runs<'a>(content: impl Iterator<Item = (u16, u16, &'a Cell)>, depth: Depth) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
     for (column, row, cell) in content {
-        let style = Style { fore: shown(cell.fg), back: shown(cell.bg), modifier: cell.modifier };
+        let (fore, back) = (depth.shown(cell.fg, false), depth.shown(cell.bg, true));
+        let style = Style { fore, back, modifier: cell.modifier };
         let is_blank = cell.symbol() == " " && !cell.modifier.contains(Modifier::REVERSED);
         let columns = cell.cell_width().max(1);
         let beside = runs.last_mut().filter(|run| {
@@ -186,7 +189,7 @@ impl<W: Write> Backend for DiffBackend<W> {
     type Error = io::Error;
 
     fn draw<'a, I: Iterator<Item = (u16, u16, &'a Cell)>>(&mut self, content: I) -> io::Result<()> {
-        let runs = runs(content, if self.has_true_colour { true_colour } else { std::convert::identity });
+        let runs = runs(content, self.depth);
         if runs.is_empty() {
             return Ok(());
         }
@@ -212,7 +215,12 @@ impl<W: Write> Backend for DiffBackend<W> {
             written = style;
             for run in runs.iter().filter(|run| run.style == style) {
                 out.write_all(way(cursor, run.from).as_bytes())?;
-                write_symbols(out, &run.symbols, self.erases)?;
+                // What is erased has the background, which is not that of reversed letters.
+                write_symbols(
+                    out,
+                    &run.symbols,
+                    self.erases && !style.modifier.contains(Modifier::REVERSED),
+                )?;
                 let (row, column) = run.from;
                 let is_sure = column + run.columns <= self.rightmost && run.is_narrow();
                 cursor = is_sure.then_some((row, column + run.columns));
@@ -280,7 +288,7 @@ mod tests {
         cell.set_symbol("x").set_style(ratatui::style::Style::new().fg(Color::Indexed(75)));
         let mut written = Vec::new();
         let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
-        terminal.has_true_colour = true;
+        terminal.depth = Depth::True;
         terminal.draw([(0, 0, &cell)].into_iter()).unwrap();
         let written = String::from_utf8(written).unwrap();
         assert!(written.contains("\x1b[38;2;116;192;255m\x1b[1;1Hx\x1b[m"), "{written:?}");

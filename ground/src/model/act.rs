@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use super::quantity::{self, Quantity};
 use super::{
-    Model, Page, Role, Vehicle, why_not_arm, why_not_check, why_not_here, why_not_seen, why_not_start,
-    why_not_take, words,
+    Checklist, Mark, Model, Page, Role, Vehicle, why_not_arm, why_not_check, why_not_here, why_not_seen,
+    why_not_start, why_not_take, words,
 };
 use crate::key::Key;
 
@@ -158,7 +158,13 @@ impl Act {
                 let is_ours = model.settings.demonstration && model.settings.role == Role::Station;
                 is_ours && !model.vehicle.in_flight() && model.vehicle.interlocks().is_some()
             }
-            Self::SignStep | Self::VoidStep => commands && model.checklist.is_some(),
+            Self::SignStep | Self::VoidStep => {
+                let is_signed = |list: &Checklist| {
+                    let step = model.chosen_step(now).and_then(|step| list.steps.get(step));
+                    step.is_some_and(|step| matches!(step.mark, Mark::Signed(_)) == (self == Self::VoidStep))
+                };
+                commands && model.checklist.as_ref().is_some_and(is_signed)
+            }
             Self::Show(_) | Self::Hold | Self::Palette | Self::NextTheme | Self::Redraw | Self::Quit => true,
         }
     }

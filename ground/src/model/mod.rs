@@ -237,6 +237,8 @@ pub struct Model {
     pub(crate) abort_before: Option<String>,
     /// When a screen that commands nothing was last given a command.
     pub(crate) nothing_sent_at: Option<Duration>,
+    /// The last answer to a key of this screen, and when it was given.
+    pub(crate) answer: Option<(String, Duration)>,
     /// The unfinished state last stored beside the log.
     pub(crate) stored_unfinished: Option<Unfinished>,
     /// When the last position is checked next.

@@ -19,11 +19,11 @@ use protocol::signing::SigningCounters;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use crate::key::Key;
-pub use crate::model::{Action, Request};
 use crate::model::{
-    BookState, Checklist, CommandKind, Degrees, LastPlace, LinkReport, LogHealth, LogStanding, Model, Role,
-    Sample, Seat, Silence, Unfinished,
+    Act, BookState, Checklist, CommandKind, Degrees, LastPlace, LinkReport, LogHealth, LogStanding, Model,
+    Role, Sample, Seat, Silence, Unfinished,
 };
+pub use crate::model::{Action, Request};
 
 /// The name of a signal, or of another reason to end.
 pub type SignalName = &'static str;
@@ -130,6 +130,13 @@ mod frame_bytes {
 
 /// Applies a message to the model and returns the tasks for the run loop.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
+    // An acknowledgement is shown in the alarm.
+    let acknowledges = |key: &Key| Act::of_key(*key) == Some(Act::Acknowledge);
+    let is_answered = match &msg {
+        Msg::Keys(keys) => !keys.iter().all(acknowledges),
+        msg => matches!(msg, Msg::Report(_)),
+    };
+    let before = model.events.total();
     match msg {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
@@ -232,6 +239,12 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             on_station_tick(model, now);
             tick::on_tick(model, now);
         }
+    }
+    // A command has a row of its own.
+    let is_sent = model.outbox.iter().any(|action| matches!(action, Action::Send(_)));
+    if is_answered && model.events.total() > before && !is_sent {
+        let answer = model.events.newest(1).next();
+        model.answer = answer.map(|event| (format!("{}{}", event.mark().trim_start(), event.text), now));
     }
     vehicle_changes::watch_approach(model, now);
     alarms::watch(model, now);

@@ -144,10 +144,69 @@ const TRUE_COLOURS: [u32; NUMBERS.len()] = [
     0xa3b0bd, 0xf0f4f8,
 ];
 
-/// A colour on a terminal of 24 bits.
-pub fn true_colour(colour: Color) -> Color {
-    let place = NUMBERS.iter().position(|number| Color::Indexed(*number) == colour);
-    place.map_or(colour, |place| Color::from_u32(TRUE_COLOURS[place]))
+/// The same on a terminal of 16 colours: of a letter, and of its ground, which has the first eight.
+const SIXTEEN: [(u8, u8); NUMBERS.len()] = [
+    (0, 0),
+    (4, 4),
+    (4, 4),
+    (0, 0),
+    (1, 1),
+    (14, 6),
+    (10, 2),
+    (5, 5),
+    (9, 1),
+    (7, 7),
+    (11, 3),
+    (11, 3),
+    (13, 5),
+    (3, 3),
+    (0, 0),
+    (0, 0),
+    (8, 4),
+    (0, 0),
+    (8, 0),
+    (8, 0),
+    (7, 7),
+    (15, 7),
+];
+
+/// How many colours a terminal has.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Depth {
+    Sixteen,
+    #[default]
+    Indexed,
+    /// 24 bits.
+    True,
+}
+
+impl Depth {
+    /// Reads it from the environment: `COLORTERM` and `TERM`. Over SSH COLORTERM is not passed on;
+    /// the listed terminals are known to have 256 colours.
+    pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
+        const KNOWN: [&str; 6] = ["256color", "kitty", "foot", "alacritty", "ghostty", "wezterm"];
+        let term = variable("TERM").unwrap_or_default();
+        match variable("COLORTERM").as_deref() {
+            Some("truecolor" | "24bit") => Self::True,
+            None | Some("") if !KNOWN.iter().any(|name| term.contains(name)) => Self::Sixteen,
+            _ => Self::Indexed,
+        }
+    }
+
+    /// A colour of a theme as the terminal has it.
+    pub fn shown(self, colour: Color, is_ground: bool) -> Color {
+        let place = NUMBERS.iter().position(|number| Color::Indexed(*number) == colour);
+        match (self, place) {
+            (Self::True, Some(place)) => Color::from_u32(TRUE_COLOURS[place]),
+            (Self::Sixteen, Some(place)) if is_ground => Color::Indexed(SIXTEEN[place].1),
+            (Self::Sixteen, Some(place)) => Color::Indexed(SIXTEEN[place].0),
+            // White, which is not in the list.
+            (Self::Sixteen, None) if colour == Color::Indexed(231) => {
+                Color::Indexed(if is_ground { 7 } else { 15 })
+            }
+            _ => colour,
+        }
+    }
 }
 
 /// What the terminal can show, and in which colours.
@@ -165,9 +224,11 @@ impl Theme {
     pub fn of_environment(variable: impl Fn(&str) -> Option<String>) -> Self {
         let set = |name: &str| variable(name).filter(|value| !value.is_empty());
         let term = set("TERM").unwrap_or_default();
-        // Over SSH COLORTERM is not passed on; these terminals are known to have colours.
-        let known = ["256color", "kitty", "foot", "alacritty", "ghostty", "wezterm"];
-        let has_colours = known.iter().any(|name| term.contains(name)) || set("COLORTERM").is_some();
+        // All that are in use but these have colours (terminfo, `colors`).
+        let is_without = ["", "dumb", "unknown"].contains(&term.as_str())
+            || term.starts_with("vt")
+            || ["-m", "-mono"].iter().any(|end| term.ends_with(end));
+        let has_colours = !is_without || set("COLORTERM").is_some();
         let palette = if set("NO_COLOR").is_some() || !has_colours {
             Palette::None
         } else if set("COLORFGBG").is_some_and(|colours| colours.ends_with(";15")) {
@@ -332,7 +393,10 @@ mod theme_tests {
     fn the_environment_selects_characters_and_colours() {
         for (set, palette, ascii) in [
             (vec![("TERM", "xterm-256color"), ("LANG", "C.UTF-8")], Palette::Dark, false),
-            (vec![("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")], Palette::None, false),
+            (vec![("TERM", "tmux"), ("LC_ALL", "de_DE.utf8"), ("LANG", "C")], Palette::Dark, false),
+            (vec![("TERM", "xterm"), ("LANG", "C.UTF-8")], Palette::Dark, false),
+            (vec![("TERM", "vt220"), ("LANG", "C.UTF-8")], Palette::None, true),
+            (vec![("TERM", "dumb")], Palette::None, true),
             (vec![("TERM", "tmux"), ("COLORTERM", "truecolor")], Palette::Dark, true),
             (vec![("TERM", "xterm-kitty"), ("LANG", "C.UTF-8")], Palette::Dark, false),
             (vec![("TERM", "alacritty")], Palette::Dark, true),
@@ -341,7 +405,7 @@ mod theme_tests {
             (vec![("NO_COLOR", "1"), ("TERM", "xterm-256color")], Palette::None, true),
             (vec![("NO_COLOR", ""), ("TERM", "xterm-256color")], Palette::Dark, true),
             (vec![("TERM", "rxvt-256color"), ("COLORFGBG", "0;15")], Palette::Light, true),
-            (vec![("TERM", "linux"), ("LANG", "C.UTF-8")], Palette::None, true),
+            (vec![("TERM", "linux"), ("LANG", "C.UTF-8")], Palette::Dark, true),
         ] {
             let found = Theme::of_environment(|name| {
                 set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())

@@ -124,8 +124,10 @@ pub fn draw_state(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
 
 /// How long the newest event is shown in the row of the state on the Pad page.
 const EVENT_SHOWN: Duration = Duration::from_secs(10);
+/// How long the answer to a key is shown there on every page: long enough to be read.
+const ANSWER_SHOWN: Duration = Duration::from_secs(4);
 
-/// An acknowledged alarm, the next event, or the newest event.
+/// The answer to a key, an acknowledged alarm, the next event, or the newest event.
 fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> Option<Line<'static>> {
     let seen = status_lines::alarm_text(model, theme, now, columns);
     let seen = seen.filter(|_| model.alarms.unacknowledged() == 0).map(|line| line.to_string());
@@ -141,7 +143,9 @@ fn in_the_middle(model: &Model, theme: Theme, now: Duration, columns: usize) -> 
     // After an acknowledged abort the next event matters.
     let aborted = model.alarms.foremost().is_some_and(|alarm| alarm.what.kind == AlarmKind::Aborted);
     let after = if aborted { next() } else { None };
-    let words = after.or(seen).or_else(next).or_else(ready).or_else(event_words)?;
+    let answer = model.answer.as_ref().filter(|(_, at)| now.saturating_sub(*at) < ANSWER_SHOWN);
+    let answer = answer.map(|(text, _)| format!(" {text}"));
+    let words = after.or(answer).or(seen).or_else(next).or_else(ready).or_else(event_words)?;
     Some(Line::from(status_lines::cut(&words, columns)))
 }
 

@@ -12,6 +12,7 @@ mod crew;
 mod daemon;
 mod disarm;
 mod endings;
+mod every_key;
 mod field;
 mod finding;
 mod flights;

@@ -5,7 +5,7 @@ use ground::key::Key;
 use ground::model::{Acknowledgement, CommandKind};
 use ground::update::Msg;
 use ground::view::status_lines;
-use ground::view::theme::{Level, Palette, Theme, true_colour};
+use ground::view::theme::{Depth, Level, Palette, Theme};
 use ground::view::top_lines::level;
 use protocol::dialect::{TdAbortEffect, TdBooster, TdInterlock, TdLatch, TdMotor, TdPhase};
 use strum::VariantArray as _;
@@ -85,9 +85,9 @@ fn unreadable(rig: &Rig, (columns, rows): (u16, u16), theme: Theme) -> Vec<Strin
         .flat_map(|(row, cells)| cells.iter().map(move |cell| (row, cell)))
         .filter(|(_, cell)| !cell.symbol().trim().is_empty() && !"│─┌┐└┘├┤┬┴┼┄".contains(cell.symbol()))
         .filter_map(|(row, cell)| {
-            let found = [std::convert::identity, true_colour].map(|shown| {
+            let found = [Depth::Indexed, Depth::True].map(|depth| {
                 let mut cell = cell.clone();
-                (cell.fg, cell.bg) = (shown(cell.fg), shown(cell.bg));
+                (cell.fg, cell.bg) = (depth.shown(cell.fg, false), depth.shown(cell.bg, true));
                 let (fore, back) = colours(&cell);
                 contrast(fore, back)
             });
