@@ -48,7 +48,7 @@ static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
 /// Asks whether the terminal can distinguish a held key's repeats from presses (kitty's keyboard
 /// protocol, "Detection of support for this protocol"). crossterm drops the answer.
 pub(super) const FLAGS_QUESTION: &[u8] = b"\x1b[?u";
-static KNOWS_FLAGS: AtomicBool = AtomicBool::new(false);
+static REPORTS_FLAGS: AtomicBool = AtomicBool::new(false);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
 /// tmux reports that it does not show the screen.
 static HIDDEN: Mutex<Option<Silence>> = Mutex::new(None);
@@ -68,8 +68,8 @@ pub(super) fn answered_ago() -> Option<Duration> {
 }
 
 /// Whether the terminal has answered [`FLAGS_QUESTION`].
-pub(super) fn knows_flags() -> bool {
-    KNOWS_FLAGS.load(Ordering::Relaxed)
+pub(super) fn reports_flags() -> bool {
+    REPORTS_FLAGS.load(Ordering::Relaxed)
 }
 
 /// Why tmux does not show this screen, or takes its keys.
@@ -189,7 +189,7 @@ impl Sieve {
                 (1, b'[') => 2,
                 (2, b'?') | (3, b'0'..=b'9') => 3,
                 (3, b'u') => {
-                    KNOWS_FLAGS.store(true, Ordering::Relaxed);
+                    REPORTS_FLAGS.store(true, Ordering::Relaxed);
                     0
                 }
                 _ => 0,
@@ -248,5 +248,17 @@ mod tests {
             assert_eq!(keys, b"a\x1b\x1b[Aq\x1b[0~\x1b\x1b[0", "{length}");
         }
         assert!(answered_ago().is_some() && answered_ago().is_none());
+    }
+
+    /// crossterm drops it; a key that looks like its beginning is none.
+    #[test]
+    fn the_answer_about_key_repeats_is_noticed_in_any_pieces() {
+        let mut sieve = Sieve::default();
+        for pieces in [&[&b"\x1b[?"[..], b"1", b"c", b"u"], &[b"\x1b[", b"?0", b"u"]] {
+            let before = reports_flags();
+            let passed: Vec<u8> = pieces.iter().flat_map(|piece| sieve.pass(piece)).collect();
+            assert_eq!(passed, pieces.concat());
+            assert_eq!(reports_flags() && !before, pieces.len() == 3, "{pieces:?}");
+        }
     }
 }

@@ -238,8 +238,11 @@ pub(super) fn ended(model: &Model, exit: Exit, log: Option<&PathBuf>, now: Durat
 }
 
 fn verdict_table(model: &Model, verdict: &Verdict, now: Duration) -> String {
-    let mut text = String::from("touchdown, against the design envelope of its legs\n");
-    for row in limit_rows(&verdict.touchdown, model.vehicle.limits().as_ref()) {
+    let under_parachute = Ending::of(&model.vehicle, now) == Some(Ending::UnderParachute);
+    let against =
+        if under_parachute { "under the parachute" } else { "against the design envelope of its legs" };
+    let mut text = format!("touchdown, {against}\n");
+    for row in limit_rows(&verdict.touchdown, model.vehicle.limits().as_ref(), under_parachute) {
         let word = if row.is_met { "ok" } else { "NO" };
         let value = fixed(row.value, 3);
         let _ = writeln!(text, "  {word} {:<8} {value:>9} {:<6} {}", row.name, row.unit, row.limit);

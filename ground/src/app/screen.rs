@@ -152,8 +152,8 @@ impl Screen {
     /// Whether the terminal distinguishes a held key's repeats from presses. It is asked to as soon
     /// as it has answered that it can: some terminals answer nothing, and none is waited for.
     pub fn reports_repeats(&mut self) -> bool {
-        if answers::knows_flags() && !KEYBOARD_ENHANCED.swap(true, Ordering::Relaxed) {
-            // Event types need escape codes; without the first flag Ctrl-X would stay a single byte.
+        if answers::reports_flags() && !KEYBOARD_ENHANCED.swap(true, Ordering::Relaxed) {
+            // Event types need escape codes; without the first flag Ctrl-X would stay one byte.
             let flags = KeyboardEnhancementFlags::DISAMBIGUATE_ESCAPE_CODES
                 | KeyboardEnhancementFlags::REPORT_EVENT_TYPES;
             // Writing to a buffer in memory cannot fail.

@@ -115,7 +115,10 @@ pub(super) async fn the_station(named: Option<&Path>) -> anyhow::Result<PathBuf>
         0 => anyhow::bail!("no ground station of yours runs; start one with `ground daemon`"),
         1 => Ok(found.remove(0).0),
         _ => {
-            anyhow::bail!("several ground stations of yours run; name one with --socket:\n{}", listed(&found))
+            anyhow::bail!(
+                "several ground stations of yours run: add --socket and one of these sockets, as in `ground attach --socket PATH`\n{}",
+                listed(&found)
+            )
         }
     }
 }

@@ -294,6 +294,24 @@ mod tests {
         assert!(written.contains("\x1b[38;2;116;192;255m\x1b[1;1Hx\x1b[m"), "{written:?}");
     }
 
+    /// What is erased has the colours of the terminal, not those of reversed letters.
+    #[test]
+    fn blanks_of_reversed_letters_are_written_and_16_colours_have_their_own_codes() {
+        let style = ratatui::style::Style::new().fg(Color::Indexed(79)).bg(Color::Indexed(124));
+        for (modifier, blanks) in
+            [(Modifier::REVERSED, " ".repeat(14)), (Modifier::BOLD, "\x1b[14X".to_owned())]
+        {
+            let mut cell = Cell::default();
+            cell.set_style(style.add_modifier(modifier));
+            let mut written = Vec::new();
+            let mut terminal = DiffBackend::new(CrosstermBackend::new(&mut written));
+            terminal.depth = Depth::Sixteen;
+            terminal.draw((0..14).map(|column| (column, 0, &cell))).unwrap();
+            let written = String::from_utf8(written).unwrap();
+            assert!(written.contains(&blanks) && written.contains(";92;41m"), "{written:?}");
+        }
+    }
+
     /// Behind a full row of the narrower terminal the cursor's place is not known.
     #[test]
     fn a_terminal_that_became_narrower_is_drawn_in_the_right_columns() {

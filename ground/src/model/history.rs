@@ -126,13 +126,20 @@ impl Trace {
     }
 }
 
+/// Silence from which no value of a flight is repeated: twice the longest pause between any two
+/// messages of a vehicle in flight on the slowest link.
+const SILENT_FROM: Duration = Duration::from_millis(400);
+
 /// Adds a row with the present values, if one is due, and notes the silence in flight.
 pub(crate) fn note_trace(model: &mut Model, now: Duration) {
     let in_flight = model.vehicle.phase_now().is_some_and(is_flight);
     if let Some(last_frame_at) = model.link.last_frame_at.filter(|_| in_flight) {
         model.history.silence = model.history.silence.max(now.saturating_sub(last_frame_at));
     }
-    if now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
+    // A flight whose link is silent is not at its last height.
+    let last_at = model.link.last_frame_at.map(|at| model.link.uplink.pace.of_the_vehicle(at, now));
+    let is_silent = in_flight && last_at.is_none_or(|at| now.saturating_sub(at) > SILENT_FROM);
+    if is_silent || now < model.history.trace.due_at(in_flight) || model.vehicle.heartbeat.is_none() {
         return;
     }
     let row = std::array::from_fn(|place| {

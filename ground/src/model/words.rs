@@ -36,7 +36,7 @@ pub fn of_event(text: &str) -> Option<Cow<'_, str>> {
 /// What steers the burn, by the name of its level, as in `SHIFTED_PLAN`.
 pub fn steered(level: &str) -> String {
     match level {
-        "IDLE" => "not begun".to_owned(),
+        "IDLE" => "no plan yet".to_owned(),
         "CONVERGED" => "on its plan".to_owned(),
         "BEST_FEASIBLE" => "near its plan".to_owned(),
         "SHIFTED_PLAN" => "on its last plan".to_owned(),

@@ -87,8 +87,8 @@ const ALPHABET: &str = include_str!("letters.txt");
 /// Pixels of a digit with the gap behind it.
 const DIGIT_PIXELS: u16 = 5;
 
-/// Rows of pixels of the alphabet. The last one is below the feet of the letters: a point reaches
-/// into it, so that it is not read as a part of the digit beside it.
+/// Rows of pixels of the alphabet. The last one is below the feet of the letters, for a comma. A
+/// point is wide, not high: it is not read as a comma, nor as a part of the digit beside it.
 const PIXEL_ROWS: usize = 6;
 
 /// The columns of pixels of a text, each with a gap between two letters behind its last one.

@@ -11,7 +11,7 @@ use ratatui::text::{Line, Span};
 use super::panels::{decimals, limit_rows};
 use super::theme::Ink;
 use super::{STALE_MARK, TextRole, Theme, age_mark, draw_line, fixed, shortest, widgets};
-use crate::model::{Deflection, Gimbal, Model, Sample, Verdict, words};
+use crate::model::{Deflection, Ending, Gimbal, Model, Sample, Verdict, words};
 
 /// Position of the limit on a bar, as a share, so that an excess can be seen.
 const LIMIT_AT: f64 = 0.8;
@@ -63,11 +63,13 @@ pub fn draw_limits(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         return draw_line(frame, inside, theme.line(" no prediction", TextRole::Label));
     };
     let in_table_2 = |verdict: Sample<Verdict>| verdict.value.landing.contains(TdLanding::TD_LANDING_TABLE_2);
-    let outside_table_2 = vehicle.verdict().is_some_and(|verdict| !in_table_2(verdict));
-    let rows = limit_rows(&at.value, vehicle.limits().as_ref());
+    let under_parachute = Ending::of(vehicle, now) == Some(Ending::UnderParachute);
+    let outside_table_2 = !under_parachute && vehicle.verdict().is_some_and(|verdict| !in_table_2(verdict));
+    let rows = limit_rows(&at.value, vehicle.limits().as_ref(), under_parachute);
     let failed: Vec<_> = rows.iter().filter(|row| !row.is_met).map(|row| row.name).collect();
     let words = match () {
         () if !failed.is_empty() => theme.line(format!(" OUTSIDE {} ", failed.join(", ")), TextRole::Alarm),
+        () if under_parachute => theme.line(" under the parachute ", TextRole::Label),
         () if outside_table_2 => theme.line(" T2: the paper's Table 2 ", TextRole::Caution),
         () => theme.line(" inside the envelope ", TextRole::Good),
     };

@@ -191,7 +191,8 @@ fn timeline(model: &Model, theme: Theme, now: Duration, columns: usize, is_wide:
             }
         }
     }
-    if !rows[0][here].0.is_alphanumeric() {
+    // Never within a name or its time.
+    if !rows[0][here].0.is_alphanumeric() && rows[0][here].0 != '.' {
         rows[0][here] = (NOW, Ink::Body);
     }
     let span = |run: &[(char, Ink)]| {

@@ -179,9 +179,9 @@ pub fn of_flight(model: &Model, now: Duration) -> (Item, Vec<Item>) {
     let off_pad = comes_down(model, now).map(|at| Sample::new(libm::hypot(at.east_m, at.north_m), now));
     let fence_m = vehicle.fence_m();
     let lands_off = || {
-        let mut lands = number("lands off m", off_pad, 0, 3, now).predicted();
+        let mut lands = number("lands off pad m", off_pad, 0, 3, now).predicted();
         if off_pad.zip(fence_m).is_some_and(|(off_pad, fence_m)| off_pad.value > fence_m) {
-            (lands.label, lands.role) = ("OFF, PAST FENCE".to_owned(), TextRole::Caution);
+            (lands.label, lands.role) = ("LANDS PAST FENCE".to_owned(), TextRole::Caution);
         }
         lands
     };

@@ -1,6 +1,7 @@
 //! Lists of lines: the newest events and the checklist.
 
 use std::borrow::Cow;
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use protocol::log::record::EventLevel;
@@ -53,10 +54,31 @@ pub fn events(model: &Model, theme: Theme, columns: usize, rows: usize) -> Vec<L
     lines
 }
 
-/// The events of interest to the crew, the newest first, each in the words of the crew.
+/// The events of interest to the crew, the newest first, each in the words of the crew. A command
+/// is one line that changes, and what station and vehicle report alike is one event.
 pub fn crew_events(model: &Model) -> impl Iterator<Item = (&Event, Cow<'_, str>)> {
     let newest = model.events.newest(usize::MAX).rev();
-    newest.filter_map(|event| Some((event, words::of_event(&event.text)?)))
+    let mut newer: VecDeque<(Duration, Cow<str>)> = VecDeque::new();
+    newest.filter_map(move |event| {
+        let text = words::of_event(&event.text)?;
+        while newer.front().is_some_and(|(at, _)| at.saturating_sub(event.at) > ONE_EVENT_WITHIN) {
+            newer.pop_front();
+        }
+        let of = command_of(&text).map_or(text.clone(), |command| command.to_owned().into());
+        let is_shown = event.level == EventLevel::Info && newer.iter().any(|(_, shown)| *shown == of);
+        newer.push_back((event.at, of));
+        (!is_shown).then_some((event, text))
+    })
+}
+
+/// Within this time the same words are the same event, and a command has its answer.
+const ONE_EVENT_WITHIN: Duration = Duration::from_secs(2);
+
+/// The name of the command of which an event reports a step.
+fn command_of(text: &str) -> Option<&str> {
+    let (name, rest) = text.split_once(' ')?;
+    let is_step = ["commanded", "acknowledged: ", "observed: "].iter().any(|step| rest.starts_with(step));
+    (is_step && name.chars().all(|letter| letter.is_ascii_uppercase())).then_some(name)
 }
 
 /// The time of an event: from the lift-off once there was one, otherwise since the start of the

@@ -171,6 +171,12 @@ fn draw_small(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, are
         let ready = ready.map(|(words, role)| theme.line(format!(" {words}"), role));
         lines.extend(hands_off);
         lines.extend(next.map(|words| theme.line(words, TextRole::Title)));
+        if model.vehicle.in_flight() {
+            let (main, others) = headline::of_flight(model, now);
+            let number = |item: &band::Item| format!(" {} {} ", item.label, item.text.trim());
+            let numbers: String = std::iter::once(&main).chain(&others).map(number).collect();
+            lines.push(theme.line(status_lines::cut(&numbers, columns), TextRole::Title));
+        }
         lines
             .extend(status_lines::alarm_text(model, theme, now, columns).filter(|_| model.playing.is_none()));
         lines.extend(message.or(ready));

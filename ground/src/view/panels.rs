@@ -61,8 +61,12 @@ pub struct LimitRow {
 const TABLE_2: [f64; 6] = [20.0, 0.2, 0.4, 0.1, 5.0, 2.0];
 
 /// A touchdown against the fence and the design envelope of the legs, as the vehicle limits and
-/// judges it.
-pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> [LimitRow; 6] {
+/// judges it; under a parachute against the fence alone.
+pub fn limit_rows(
+    at: &Touchdown,
+    limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>,
+    under_parachute: bool,
+) -> [LimitRow; 6] {
     let reported = |pick: fn(&TD_TOUCHDOWN_LIMITS_DATA) -> f32| {
         limits.map_or(f64::NAN, |limits| f64::from(pick(limits)))
     };
@@ -83,6 +87,11 @@ pub fn limit_rows(at: &Touchdown, limits: Option<&TD_TOUCHDOWN_LIMITS_DATA>) -> 
             _ if limits.is_none() => format!("-- {unit}"),
             _ => format!("±{} {unit}", shortest(most)),
         };
+        if under_parachute && bit != TdLimit::TD_LIMIT_DISTANCE {
+            let name = if bit == TdLimit::TD_LIMIT_VERTICAL_SPEED { "descent" } else { name };
+            let (limit, used, table_2) = (String::new(), f64::NAN, f64::INFINITY);
+            return LimitRow { name, value, unit, limit, used, is_met: true, table_2 };
+        }
         let beyond_fence = bit == TdLimit::TD_LIMIT_DISTANCE && most > 0.0 && value > most;
         let is_met = !at.violated.contains(bit) && !beyond_fence;
         LimitRow { name, value, unit, limit, used: value.abs() / most, is_met, table_2: TABLE_2[place] }
@@ -119,8 +128,10 @@ pub fn lost_rows(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'static
         Basis::Fall => "fall, last drag",
         Basis::FreeFall => "free fall; no plan",
     };
+    // The error is that of the position over the ground.
+    let height = format!("{:>6} m", fixed(at.altitude_m, 0));
     vec![
-        row("alt", at.altitude_m),
+        Line::from_iter([theme.label(format!(" {:<6}pred", "alt")), theme.span(height, TextRole::Stale)]),
         row("north", at.spot.north_m),
         row("east", at.spot.east_m),
         theme.line(format!(" {source}"), TextRole::Label),
@@ -156,8 +167,18 @@ mod limit_rows_tests {
     }
 
     #[test]
+    fn under_a_parachute_the_fence_alone_is_a_limit() {
+        let mut hard = at(5.0);
+        hard.violated = TdLimit::all();
+        let met = |under_parachute| limit_rows(&hard, Some(&LIMITS), under_parachute).map(|row| row.is_met);
+        assert_eq!(met(false), [false; 6]);
+        assert_eq!(met(true), [false, true, true, true, true, true]);
+        assert_eq!(limit_rows(&hard, Some(&LIMITS), true)[2].name, "descent");
+    }
+
+    #[test]
     fn limits_come_from_the_vehicle_and_are_blank_before_its_report() {
-        let words = |limits| limit_rows(&at(0.0), limits).map(|row| row.limit);
+        let words = |limits| limit_rows(&at(0.0), limits, false).map(|row| row.limit);
         assert_eq!(words(None), ["", "", "-- m/s", "-- m/s", "-- deg", "-- deg/s"]);
         assert_eq!(words(Some(&LIMITS)), ["±120 m", "", "±1.5 m/s", "±0.6 m/s", "±7.5 deg", "±12 deg/s"]);
     }
@@ -169,7 +190,7 @@ mod limit_rows_tests {
         let flight::rules::verdict::Touchdown { lateral_m_s, tilt_rad, rate_rad_s, .. } = OF_THE_VEHICLE;
         let [tilt_deg, rate_deg_s] = [tilt_rad, rate_rad_s].map(f64::to_degrees);
         let expected = [distance_m, height_m, vertical_m_s, lateral_m_s, tilt_deg, rate_deg_s];
-        for (row, expected) in limit_rows(&at(0.0), None).iter().zip(expected) {
+        for (row, expected) in limit_rows(&at(0.0), None, false).iter().zip(expected) {
             assert!((row.table_2 - expected).abs() < 1e-9, "{}: {} {expected}", row.name, row.table_2);
         }
     }
@@ -177,7 +198,7 @@ mod limit_rows_tests {
     #[test]
     fn every_limit_is_used_from_a_perfect_landing_to_its_edge() {
         for share in [0.0, 1.0, 2.0] {
-            let used = limit_rows(&at(share), Some(&LIMITS)).map(|row| row.used);
+            let used = limit_rows(&at(share), Some(&LIMITS), false).map(|row| row.used);
             assert!((used[0] - 3.0 / 120.0).abs() < 1e-9, "of the fence");
             assert!(used[1].is_nan(), "it has no limit");
             assert!(used[2..].iter().all(|used| (used - share).abs() < 1e-6), "{used:?}");

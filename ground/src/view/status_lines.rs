@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::dialect::{TdBooster, TdChute, TdMotor, TdPhase};
+use protocol::dialect::{TdBooster, TdChute, TdInterlock, TdMotor, TdPhase};
 use ratatui::text::{Line, Span};
 use unicode_truncate::UnicodeTruncateStr as _;
 
@@ -60,6 +60,9 @@ fn event(vehicle: &Vehicle, phase: TdPhase, now: Duration) -> Option<(String, St
         }
         TdPhase::TD_PHASE_DEPLOY => words("fins open", ", then the steered descent"),
         TdPhase::TD_PHASE_AERO_DESCENT | TdPhase::TD_PHASE_LAND_ARMED => Some(ignition(vehicle, phase, now)),
+        TdPhase::TD_PHASE_IGNITION if vehicle.shows(TdInterlock::TD_INTERLOCK_NO_LIGHT) => {
+            words("the ground", ", NO LIGHT")
+        }
         TdPhase::TD_PHASE_IGNITION => words("thrust", " within 0.5 s, or NO LIGHT"),
         TdPhase::TD_PHASE_POWERED => {
             let left_s = vehicle.touchdown_in_s(now).map(|left| left.value);

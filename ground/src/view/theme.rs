@@ -144,30 +144,10 @@ const TRUE_COLOURS: [u32; NUMBERS.len()] = [
     0xa3b0bd, 0xf0f4f8,
 ];
 
-/// The same on a terminal of 16 colours: of a letter, and of its ground, which has the first eight.
-const SIXTEEN: [(u8, u8); NUMBERS.len()] = [
-    (0, 0),
-    (4, 4),
-    (4, 4),
-    (0, 0),
-    (1, 1),
-    (14, 6),
-    (10, 2),
-    (5, 5),
-    (9, 1),
-    (7, 7),
-    (11, 3),
-    (11, 3),
-    (13, 5),
-    (3, 3),
-    (0, 0),
-    (0, 0),
-    (8, 4),
-    (0, 0),
-    (8, 0),
-    (8, 0),
-    (7, 7),
-    (15, 7),
+/// The same on a terminal of 16 colours: of letters, and of their ground (the first eight).
+const SIXTEEN: [[u8; NUMBERS.len()]; 2] = [
+    [0, 4, 4, 0, 1, 14, 10, 5, 9, 7, 11, 11, 13, 3, 0, 0, 8, 0, 8, 8, 7, 15],
+    [0, 4, 4, 0, 1, 6, 2, 5, 1, 7, 3, 3, 5, 3, 0, 0, 4, 0, 0, 0, 7, 7],
 ];
 
 /// How many colours a terminal has.
@@ -198,8 +178,7 @@ impl Depth {
         let place = NUMBERS.iter().position(|number| Color::Indexed(*number) == colour);
         match (self, place) {
             (Self::True, Some(place)) => Color::from_u32(TRUE_COLOURS[place]),
-            (Self::Sixteen, Some(place)) if is_ground => Color::Indexed(SIXTEEN[place].1),
-            (Self::Sixteen, Some(place)) => Color::Indexed(SIXTEEN[place].0),
+            (Self::Sixteen, Some(place)) => Color::Indexed(SIXTEEN[usize::from(is_ground)][place]),
             // White, which is not in the list.
             (Self::Sixteen, None) if colour == Color::Indexed(231) => {
                 Color::Indexed(if is_ground { 7 } else { 15 })

@@ -43,7 +43,7 @@ fn is_forbidden(action: &Action) -> bool {
 }
 
 #[test]
-fn every_key_does_what_the_help_page_says_in_every_state_and_role() {
+fn every_key_does_what_the_help_page_states_in_every_state_and_role() {
     let mut wrong = Vec::new();
     for definition in &DEFINITIONS {
         for (state, mut rig) in states() {

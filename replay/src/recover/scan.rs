@@ -115,7 +115,7 @@ impl Records {
                 contents.lose(at, self.size - at, None, "more records than any log has");
                 break;
             }
-            // The sizes in a chunk's fields; if they are wrong, its content contradicts its checksum.
+            // The sizes in a chunk's fields; if they are wrong, its content fails its checksum.
             let fields = if opcode == op::CHUNK { OVERLAP_BYTES as u64 } else { 0 };
             let fields = ChunkHead::read(&self.read(end_of_head, fields)?);
             let length = fields.map_or(stated, |chunk| chunk.body_bytes);

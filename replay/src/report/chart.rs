@@ -112,6 +112,9 @@ impl Chart {
         for (.., kind, name) in self.places.iter().filter(|_| self.axes != TIME) {
             legend.extend([format!(" <span class=\"{kind}\">{}</span>", escaped(name))]);
         }
+        let wind =
+            self.arrow.iter().map(|(.., words)| format!(" <span class=\"wind\">{}</span>", escaped(words)));
+        legend.extend(wind);
         format!(
             "<figure id=\"{}\" data-axes=\"{}\" data-x=\"{from:.4} {to:.4}\" data-y=\"{least:.6} {most:.6}\"><figcaption><b>{}</b>{legend}\
              </figcaption><svg viewBox=\"0 0 {} {}\"><g transform=\"translate({LEFT} {above})\"><svg class=\"plot\" width=\"{width}\" \
@@ -210,11 +213,10 @@ impl Chart {
             drawn += &dot("sign", last, Some(*x));
             drawn += &text("number middle", [x_px, last[1] + 4.0], Some(*x), &number.to_string());
         }
-        if let Some((right, up, words)) = &self.arrow {
+        if let Some((right, up, _)) = &self.arrow {
             let turned = libm::atan2(*right, *up).to_degrees();
             let (at, path) = (format!("translate(18 16) rotate({turned:.0})"), "M0 11V-11M-4-5L0-12L4-5");
             drawn.extend([format!("<path class=\"arrow\" transform=\"{at}\" d=\"{path}\"/>")]);
-            drawn += &text("name", [4.0, 42.0], None, words);
         }
         (ROW * rows + ABOVE, drawn)
     }

@@ -12,8 +12,8 @@ use ratatui::widgets::{Paragraph, Wrap, canvas};
 
 use crate::model::field;
 use crate::model::{
-    Act, Degrees, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, OWN_POSITION_OLD, PadCheck, SURFACES, Sample,
-    Spot, Standing, Way, dead_reckoning::may_have_left, shown, standing, words,
+    Act, Degrees, KeepAway, LOSS_MOST, LastPlace, MARGIN_LEAST_DB, Model, OWN_POSITION_OLD, PadCheck,
+    SURFACES, Sample, Spot, Standing, Way, dead_reckoning::may_have_left, shown, standing, words,
 };
 use crate::view::band::Room;
 use crate::view::pictures::{Plane, qr};
@@ -208,7 +208,10 @@ pub fn draw_find(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, 
     let words = Paragraph::new(find_lines(model, theme, now)).wrap(Wrap { trim: false });
     frame.render_widget(words, inside);
     let inside = framed("walk", theme.line(" N up ", TextRole::Label), theme, frame, walk);
+    let stays_away = model.chosen_tracker().is_none()
+        && KeepAway::of(&model.vehicle, now).is_some_and(|away| !away.is_for_the_pin());
     match place {
+        Some(_) if stays_away => draw_line(frame, inside, theme.line(" NOT YET", TextRole::Alarm)),
         Some(place) => draw_arrow(place.way(&place.best(), model.here()), theme, frame, inside),
         None => draw_line(frame, inside, theme.line(" --", TextRole::Label)),
     }
@@ -282,7 +285,10 @@ pub fn find_lines(model: &Model, theme: Theme, now: Duration) -> Vec<Line<'stati
     lines.push(theme.line(format!("{title}, from {from}"), TextRole::Title));
     lines.extend(spot(model, &place, &place.received, theme));
     let ago = now_unix_s.saturating_sub(place.received_unix_s);
-    lines.push(Line::from(format!("  {ago} s ago, {} m up", fixed(place.height_m, 1))));
+    let is_down = tracker.is_none() && !model.vehicle.in_flight() && place.predicted.is_none();
+    let height =
+        if is_down { "on the ground".to_owned() } else { format!("{} m up", fixed(place.height_m, 1)) };
+    lines.push(Line::from(format!("  {ago} s ago, {height}")));
     lines.extend(beside_lines(model, theme, now));
     if tracker.is_none() {
         lines.push(Line::from(format!("  boot {}", words::boot(place.boot))));

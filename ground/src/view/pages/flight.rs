@@ -38,7 +38,13 @@ pub fn draw_flying(model: &Model, theme: Theme, now: Duration, frame: &mut Frame
         Page::Ascent => state("booster", descent.clone().map(|report| report.map(booster)), theme, now),
         Page::Landing => {
             let report = model.vehicle.last::<TD_CONTROLLER_DATA>();
-            state("burn", report.map(|report| report.map(|report| panels::steered(report.level))), theme, now)
+            // A plan is good or bad once its touchdown is reported.
+            let planned = |(words, role)| match model.vehicle.prediction {
+                None if role == TextRole::Good => ("first plan".to_owned(), TextRole::Plain),
+                _ => (words, role),
+            };
+            let report = report.map(|report| report.map(|report| planned(panels::steered(report.level))));
+            state("burn", report, theme, now)
         }
         _ => band_word(model, theme, now),
     };

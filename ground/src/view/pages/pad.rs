@@ -121,13 +121,16 @@ fn draw_checklist(model: &Model, theme: Theme, now: Duration, frame: &mut Frame,
     draw_lines(frame, inside, &lists::checklist_rows(model, theme, now, size));
 }
 
+const OFF_PAD: &str = "off the pad nothing is checked for arming";
+
 /// Each failing check in the words of the vehicle, or with the value found and why it fails; how
 /// many pass; `all` of those, or those with a measured value.
 pub fn checks(model: &Model, theme: Theme, now: Duration, all: bool) -> Vec<Line<'static>> {
     // Off the pad the vehicle does not check for arming and reports no failing check.
     let off_pad = model.vehicle.phase().is_some_and(|phase| !is_on_pad(phase.value));
     let Some(status) = model.vehicle.status.as_ref().filter(|_| !off_pad) else {
-        let hints = link_hints(model, now).unwrap_or_default();
+        let after = off_pad.then(|| vec![OFF_PAD.to_owned()]);
+        let hints = link_hints(model, now).or(after).unwrap_or_default();
         let wrapped = |words: String| lists::wrap(&words, usize::from(CHECK_COLUMNS - 2));
         let lines = hints.into_iter().flat_map(wrapped);
         return lines.map(|words| Line::from(format!(" {words}"))).collect();
@@ -211,7 +214,7 @@ fn summary(model: &Model, now: Duration) -> (String, TextRole) {
     let unfit = model.vehicle.unfit_while_armed().map(|(_, words)| format!("ARMED, and NO-GO: {words}"));
     match model.vehicle.status.as_ref() {
         Some(_) if held.is_some() || unfit.is_some() => (held.or(unfit).unwrap_or_default(), TextRole::Alarm),
-        _ if off_pad => ("off the pad nothing is checked for arming".to_owned(), TextRole::Label),
+        _ if off_pad => (OFF_PAD.to_owned(), TextRole::Label),
         None if link_hints(model, now).is_some() => ("nothing received".to_owned(), TextRole::Caution),
         None => ("the vehicle has not reported its checks".to_owned(), TextRole::Caution),
         Some(status) if status.is_stale(now) || status.value.checks_failed.is_empty() => {

@@ -113,6 +113,15 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let phase = vehicle.phase_now();
     let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
     let stands = flown.last().copied().filter(|_| stands);
+    // The page that leads there has one position and one way.
+    let finds = model.page() == Page::Find && model.chosen_tracker().is_none();
+    let sought = model.sought(now).filter(|place| finds && place.predicted.is_none());
+    let stands =
+        stands.map(|at| sought.as_ref().map_or(at, |place| (place.received.east_m, place.received.north_m)));
+    let begin = model.here().zip(vehicle.pad).filter(|_| finds).map_or((0.0, 0.0), |(here, pad)| {
+        let (north_m, east_m) = pad.to(here);
+        (east_m, north_m)
+    });
     let burns = phase.is_some_and(is_burning);
     let here = vehicle.best_motion().filter(|motion| motion.value.x_m.is_finite() && !motion.is_stale(now));
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
@@ -165,7 +174,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
             plane.measured(context, &[(0.0, 0.0), at], theme.ink(Ink::Body));
         }
         if let Some(at) = stands {
-            plane.predicted(context, &[(0.0, 0.0), at], theme.ink(Ink::Body));
+            plane.predicted(context, &[begin, at], theme.ink(Ink::Body));
         }
     });
     let ink = |ink| theme.ground().fg(theme.ink(ink));
@@ -187,8 +196,8 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     }
     if let Some((x, y)) = stands {
         plane.write(frame, (x, y), "▲", theme.style(TextRole::Good));
-        let words = format!("{} m", fixed(libm::hypot(x, y), 0));
-        plane.write(frame, (beside(x / 2.0), y / 2.0), &words, strong);
+        let words = format!("{} m", fixed(libm::hypot(x - begin.0, y - begin.1), 0));
+        plane.write(frame, (beside(f64::midpoint(begin.0, x)), f64::midpoint(begin.1, y)), &words, strong);
     }
     words(model, (fence_m, per_dot), theme, frame, &plane);
     write_distances(model, (stands.or(impact), lost.or(down)), theme, frame, &plane);
