@@ -168,6 +168,7 @@ impl Computer {
             flying: flown.is_some(),
             lifted_off: self.pilot.ascent.has_lifted_off(),
             separation_due: self.pilot.ascent.separates(),
+            igniting: flown.is_some_and(|flown| self.pilot.ignites(flown.time_s)),
             hatch_free: self.hatch_is_free(input),
         };
         self.commands.outputs = Outputs::decided(self.table.mode(), progress);

@@ -34,6 +34,8 @@ pub struct FlightProgress {
     pub lifted_off: bool,
     /// Apogee is near, or has passed: the booster is to be separated.
     pub separation_due: bool,
+    /// The time of the landing igniter's current has not passed.
+    pub igniting: bool,
     /// The fins, which close over the parachute hatch, are clear of it, or have had the time to
     /// open.
     pub hatch_free: bool,
@@ -53,7 +55,9 @@ pub fn why_not(
         (PyroOutput::AscentIgniter, !locks.armed, "not armed"),
         (PyroOutput::AscentIgniter, !locks.pin_out, "the pin is in"),
         (PyroOutput::AscentIgniter, locks.abort_latched, "an abort is latched"),
-        (PyroOutput::LandingIgniter, phase != Phase::Ignition, "only IGNITION lights the landing motor"),
+        // The current lasts its full time: sensed thrust may be a knock before the motor ignites.
+        (PyroOutput::LandingIgniter, !phase.in_landing_burn(), "only the landing burn ignites its motor"),
+        (PyroOutput::LandingIgniter, !progress.igniting, "the igniter's time is over"),
         (PyroOutput::LandingIgniter, locks.landing_motor_inhibited, "the landing motor is inhibited"),
         (PyroOutput::LandingIgniter, !locks.armed, "not armed"),
         (PyroOutput::LandingIgniter, !locks.pin_out, "the pin is in"),
@@ -107,10 +111,15 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
-    use crate::rules::phase::{Event, HoldCause, StartPoint, transition};
+    use crate::rules::phase::{Effect, Event, HoldCause, StartPoint, transition};
 
-    const SEEN: FlightProgress =
-        FlightProgress { flying: true, lifted_off: false, separation_due: false, hatch_free: true };
+    const SEEN: FlightProgress = FlightProgress {
+        flying: true,
+        lifted_off: false,
+        separation_due: false,
+        igniting: false,
+        hatch_free: true,
+    };
 
     fn boosting() -> Mode {
         let mut mode = Mode { phase: Phase::Boost, ..Mode::power_up(0.0) };
@@ -136,7 +145,12 @@ mod tests {
         );
         assert_eq!(
             reasons(PyroOutput::LandingIgniter, &at_power_up, SEEN),
-            ["only IGNITION lights the landing motor", "not armed", "the pin is in"]
+            [
+                "only the landing burn ignites its motor",
+                "the igniter's time is over",
+                "not armed",
+                "the pin is in"
+            ]
         );
         assert_eq!(
             reasons(PyroOutput::Separation, &at_power_up, SEEN),
@@ -147,6 +161,12 @@ mod tests {
             reasons(PyroOutput::Parachute, &burning, SEEN),
             ["only CHUTE ejects the parachute", "the landing motor burns"]
         );
+        assert_eq!(reasons(PyroOutput::LandingIgniter, &burning, SEEN), ["the igniter's time is over"]);
+        let igniting = FlightProgress { igniting: true, ..SEEN };
+        for phase in [Phase::Ignition, Phase::Powered] {
+            let mode = Mode { phase, ..burning };
+            assert!(Outputs::decided(&mode, igniting).is_on(PyroOutput::LandingIgniter), "{phase:?}");
+        }
         let ejecting = Mode { phase: Phase::Chute, ..boosting() };
         let closed = FlightProgress { hatch_free: false, ..SEEN };
         assert_eq!(reasons(PyroOutput::Parachute, &ejecting, closed), ["the fins are still over its hatch"]);
@@ -217,6 +237,9 @@ mod tests {
                 progress.flying |= !mode.phase.on_pad();
                 progress.lifted_off |= accepted && requested == Event::LiftOff;
                 progress.separation_due |= accepted && requested == Event::SeparationDue;
+                // The current ends at any time.
+                progress.igniting &= dice >> 7 & 3 != 0;
+                progress.igniting |= answer.effects.contains(Effect::IgniteLandingMotor);
                 let outputs = Outputs::decided(&mode, progress);
                 let stops = matches!(
                     requested,

@@ -18,6 +18,9 @@ use crate::vehicle::atmosphere::STANDARD_GRAVITY_M_S2;
 pub(super) const FIN_THERE_RAD: f64 = 0.1;
 /// Largest height of a landing, m: slope of the field, pressure errors and the weather of a day.
 const NEAR_GROUND_M: f64 = 15.0;
+/// Burn time, s, from which on thrust is confirmed: a knock or a spike in the accelerometer that
+/// lasts for a tenth of a second has been recognised by then, and the motor estimate waits again.
+const CONFIRMED_S: f64 = 0.25;
 /// Duration after which a failing gate check is lasting, s: it will not recover before ignition.
 const LASTS_S: f64 = 0.5;
 /// Time before the end of the parachute's height at which the decision is taken, s. A due ignition
@@ -62,9 +65,11 @@ impl Pilot {
             }
             Phase::LandArmed => self.consider_ignition(table, seen),
             Phase::Ignition => {
-                if self.model.burning_s(time_s).is_some() {
+                let burning_s = self.model.burning_s(time_s);
+                if burning_s.is_some_and(|burning_s| burning_s >= CONFIRMED_S) {
                     self.try_apply(table, Event::ThrustConfirmed, time_s);
-                } else if self.ignited_at_s.is_some_and(|at_s| time_s - at_s >= NO_THRUST_TIMEOUT_S)
+                } else if burning_s.is_none()
+                    && !self.ignites(time_s)
                     && !table.mode().interlocks.no_light_latched
                 {
                     self.try_apply(table, Event::NoThrustTimeout, time_s);
@@ -123,6 +128,12 @@ impl Pilot {
 
     fn ignition_overdue_s(&self, estimate: &Estimate) -> Option<f64> {
         self.prediction.ignition.overdue_s(self.onset_m(estimate))
+    }
+
+    /// Whether the landing motor was commanded to ignite and the time of its igniter's current has
+    /// not passed.
+    pub(crate) fn ignites(&self, time_s: f64) -> bool {
+        self.ignited_at_s.is_some_and(|at_s| time_s - at_s < NO_THRUST_TIMEOUT_S)
     }
 
     /// The event of an abort at this moment, from the findings of the last frame, if there was one.
