@@ -12,6 +12,8 @@ use flight::vehicle::mission::{LegLimits, Mission};
 pub enum Failure {
     /// The ignition gate never opened.
     NoIgnition,
+    /// The flight computer took the vehicle for one on its pad.
+    LiftOffDenied,
     /// The motor was commanded to light and did not light in time.
     NoLight,
     /// The vehicle came down under the parachute.
@@ -37,6 +39,7 @@ impl Failure {
     pub fn name(self) -> &'static str {
         match self {
             Self::NoIgnition => "no ignition",
+            Self::LiftOffDenied => "lift-off denied",
             Self::NoLight => "no light",
             Self::Parachute => UNDER_PARACHUTE,
             Self::Limit(name) => name,
@@ -103,6 +106,7 @@ pub fn judge(mission: &Mission, ending: &Ending) -> Outcome {
         _ if !ending.finite => Some(Failure::NotANumber),
         (None, _) => Some(Failure::TimeOut),
         _ if ending.parachute => Some(Failure::Parachute),
+        _ if ending.phase.on_pad() => Some(Failure::LiftOffDenied),
         _ if !ending.ignited => Some(Failure::NoIgnition),
         _ if !ending.motor_started => Some(Failure::NoLight),
         (_, Some(Rest { outcome, strain: Some(strain), .. })) => damage(outcome, &strain),

@@ -321,7 +321,7 @@ impl Sortie {
     /// Whether the flight continues: the vehicle is not at rest and the time limit has not passed.
     pub fn goes_on(&self) -> bool {
         let Decision { mode, released, .. } = self.decision();
-        let stays = released && mode.phase.on_pad() && !self.world().ascent_motor_lights();
+        let stays = released && mode.phase.on_pad() && !self.world().leaves_pad();
         self.surroundings.go_on() && !stays
     }
 

@@ -40,9 +40,17 @@ const CLIMBS_M_S: f64 = 10.0;
 /// Time after the separation charge in which the internal pressure is not that of the air, s: three
 /// times its time constant of 0.3 s.
 const CHARGE_LASTS_S: f64 = 1.0;
-/// Time in which a sensed lift-off must be confirmed, s: the weakest motor that leaves the rail
-/// rises by 10 m in it.
+/// Time in which another sensor confirms a sensed lift-off, s: the weakest motor that leaves the
+/// rail rises by 10 m in it. After it, what follows the push decides: a flight falls freely, also
+/// with a blocked static port.
 const CONFIRMED_WITHIN_S: f64 = 2.0;
+/// Specific force below which the vehicle falls freely, or deviation from gravity along the axis
+/// within which it is upright on its pad, m/s^2, and how long either must last, s. Near apogee the
+/// drag of the slowest ascent is smaller for longer.
+const FALLS_M_S2: f64 = 0.3 * STANDARD_GRAVITY_M_S2;
+const FALLS_S: f64 = 1.0;
+/// Time after which a lift-off without any of these is rejected, s: no coast brakes for longer.
+const DECIDED_WITHIN_S: f64 = 20.0;
 /// Limits within which a vehicle is at rest: distance from its first pressure altitude, m, and
 /// speed in a fix, m/s.
 const STANDS_M: f64 = 5.0;
@@ -55,6 +63,8 @@ pub(super) struct AscentReadings {
     pub(super) phase: Phase,
     /// Along the axis, measured, m/s^2.
     pub(super) axial_specific_force_m_s2: f64,
+    /// Its magnitude in all directions, m/s^2.
+    pub(super) specific_force_m_s2: f64,
     pub(super) pressure_altitude_m: Option<f64>,
     pub(super) speeds: VerticalSpeeds,
     /// Estimated, upwards, m/s.
@@ -78,6 +88,9 @@ with_defaults! {
         confirmed: bool = false,
         /// The sensed lift-off was rejected: the accelerometer alone is not accepted any more.
         denied: bool = false,
+        /// Times since an unconfirmed lift-off for which it falls freely, and stands upright, s.
+        falls_s: f64 = 0.0,
+        stands_s: f64 = 0.0,
         braking_s: f64 = 0.0,
         separating_since_s: Option<f64> = None,
         parted: bool = false,
@@ -156,8 +169,9 @@ impl AscentWatch {
     }
 
     /// Confirms a lift-off: thrust in the accelerometer alone is not enough. Any second source that
-    /// shows motion confirms it; barometer or satellites at rest reject it. Without a decision the
-    /// vehicle flies: a failed barometer does not read a constant altitude on the pad.
+    /// shows motion confirms it, and so does free fall. Barometer or satellites at rest do not
+    /// reject it: a static port may be blocked, and receivers lose track under thrust. It is
+    /// rejected when the vehicle stands after the push, or when the push outlasts the motor.
     fn confirm_the_lift_off(&mut self, seen: &AscentReadings) -> Option<Event> {
         let (time_s, speeds) = (seen.time_s, &seen.speeds);
         let fix_m_s = speeds.gnss_m_s(time_s);
@@ -167,14 +181,22 @@ impl AscentWatch {
         let moves = self.risen_s >= RISEN_S
             || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M && pressure_m_s.abs() > STANDS_M_S)
             || fix_m_s.is_some_and(|m_s| m_s.abs() > STANDS_M_S);
+        let axial_m_s2 = seen.axial_specific_force_m_s2;
+        let stands = (axial_m_s2 - STANDARD_GRAVITY_M_S2).abs() < FALLS_M_S2;
+        let falls = seen.specific_force_m_s2 < FALLS_M_S2;
+        self.stands_s = lasts_s(self.stands_s, Some(stands), seen.frame_s);
+        self.falls_s = lasts_s(self.falls_s, Some(falls), seen.frame_s);
         // A barometer needs some time before it gives a speed.
         let since_s = time_s - self.lifted_off_at_s;
         let no_other_source = off_m.is_none() && fix_m_s.is_none() && since_s > 2.0 * RATE_OVER_S;
         if moves || no_other_source {
             self.confirmed = true;
         } else if since_s >= CONFIRMED_WITHIN_S {
-            self.confirmed = off_m.is_some_and(|off_m| off_m.abs() > STANDS_M);
-            if !self.confirmed {
+            let fell = self.falls_s >= FALLS_S && !speeds.accelerometer_lost;
+            self.confirmed = fell || off_m.is_some_and(|off_m| off_m.abs() > STANDS_M);
+            let outlasts = axial_m_s2 > PUSHED_M_S2 && since_s >= BURNS_FOR[1] * seen.burn_time_s;
+            let rejected = outlasts || self.stands_s >= FALLS_S || since_s >= DECIDED_WITHIN_S;
+            if rejected && !self.confirmed {
                 (self.lifted_off, self.denied) = (false, true);
                 return Some(Event::NoLiftOff);
             }
@@ -334,6 +356,7 @@ mod tests {
             frame_s: 0.005,
             phase,
             axial_specific_force_m_s2: force_m_s2,
+            specific_force_m_s2: force_m_s2.abs(),
             pressure_altitude_m: None,
             speeds: VerticalSpeeds::default(),
             vertical_m_s,
@@ -512,6 +535,40 @@ mod tests {
             assert_eq!(events[0], Event::LiftOff);
             assert_eq!(events.contains(&Event::NoLiftOff), denied, "{pressure} {fix}: {events:?}");
             assert_eq!(watch.has_lifted_off(), !denied);
+        }
+    }
+
+    /// With a blocked static port, what follows a push of 2 g for 2 s decides: axial and total
+    /// specific force, m/s^2.
+    #[test]
+    fn a_lift_off_without_pressure_is_rejected_on_the_pad_and_accepted_in_free_fall() {
+        for (axial_m_s2, total_m_s2, denied_at_s) in [
+            (9.8, 9.8, Some(3.0)),  // It stands again.
+            (19.6, 19.6, Some(2.4)), // The push outlasts the motor.
+            (0.2, 9.8, Some(20.0)), // It lies on its side.
+            (-0.5, 0.6, None),
+            (-2.5, 2.6, None),
+        ] {
+            let (mut watch, mut speeds) = (AscentWatch::default(), VerticalSpeeds::default());
+            let mut events = Vec::new();
+            for frame in 0..5_000 {
+                let time_s = FRAME_S * f64::from(frame);
+                let (axial_m_s2, total_m_s2) =
+                    if time_s < 2.0 { (19.6, 19.6) } else { (axial_m_s2, total_m_s2) };
+                let blocked = AscentReadings {
+                    specific_force_m_s2: total_m_s2,
+                    burn_time_s: 1.57,
+                    pressure_altitude_m: (frame % 4 == 0).then_some(0.1 * libm::sin(f64::from(frame))),
+                    ..seen(time_s, Phase::Boost, axial_m_s2, 40.0)
+                };
+                let blocked = with_speeds(&mut speeds, blocked, 0.0, None);
+                events.extend(watch.update(&blocked).map(|event| (time_s, event)));
+            }
+            let rejected = events.iter().find(|(_, event)| *event == Event::NoLiftOff);
+            assert_eq!(rejected.is_some(), denied_at_s.is_some(), "{axial_m_s2}: {events:?}");
+            let near = |(time_s, _): &(f64, Event)| denied_at_s.is_some_and(|at_s| (time_s - at_s).abs() < 0.5);
+            assert!(rejected.is_none_or(near), "{axial_m_s2}: {rejected:?}");
+            assert_eq!(watch.has_lifted_off(), denied_at_s.is_none());
         }
     }
 

@@ -206,6 +206,7 @@ impl Pilot {
             frame_s: self.model.mission.estimator.frame_s,
             phase,
             axial_specific_force_m_s2: input.measured.imu.specific_force_m_s2.x,
+            specific_force_m_s2: libm::sqrt(input.measured.imu.specific_force_m_s2.norm_squared()),
             pressure_altitude_m: input.measured.pressure_altitude_m,
             speeds: self.speeds,
             vertical_m_s: estimate.state.velocity_m_s.z,

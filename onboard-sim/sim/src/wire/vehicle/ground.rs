@@ -17,6 +17,8 @@ const UNNOTICED_S: f64 = 15.0;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct GroundWatch {
     contacts: usize,
+    /// It has left its pad, whatever its computer decides.
+    flew: bool,
     judged: Option<Judged>,
     given_up: bool,
 }
@@ -28,7 +30,7 @@ impl GroundWatch {
 
     pub(super) fn is_over(&self, computer: &Computer) -> bool {
         // The computer may be sure of the ground before the vehicle lies still.
-        (computer.is_over() && (self.contacts == 0 || self.judged.is_some())) || self.given_up
+        (computer.is_over() && (!self.flew || self.judged.is_some())) || self.given_up
     }
 
     /// Looks at a rocket after a frame.
@@ -36,6 +38,7 @@ impl GroundWatch {
         let mut events = Vec::new();
         let Some(released_at_s) = sortie.computer().released_at_s() else { return events };
         let world = sortie.world();
+        self.flew = world.leaves_pad();
         if let Some(touchdown) = world.touchdown().filter(|_| self.contacts == 0) {
             self.contacts = 1;
             let text = format!("ground contact at {:.2} m/s", touchdown.over_ground.vertical_m_s);

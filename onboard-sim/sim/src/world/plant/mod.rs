@@ -634,9 +634,10 @@ impl World {
         self.stack.as_ref().map_or(0.0, |stack| stack.thrust_n(self.time_s()))
     }
 
-    /// The ascent motor burns or has burnt, or will light if the current stays on.
-    pub fn ascent_motor_lights(&self) -> bool {
-        self.stack.as_ref().is_some_and(|stack| stack.lights())
+    /// The vehicle is without a booster, or the ascent motor burns or has burnt, or will ignite if
+    /// the current stays on.
+    pub fn leaves_pad(&self) -> bool {
+        self.stack.as_ref().is_none_or(|stack| stack.lights())
     }
 
     /// When the separation charge was fired, s.
