@@ -197,6 +197,8 @@ const SMALL: &[(&str, &str, &[f64], f64)] = &[
     ("accelerometer-spike", "ignition", &[200.0, 300.0, 500.0, 1000.0], 0.9),
     // A static port that is blocked, or nearly: the pressure stays that of the pad.
     ("barometer-scale", "boost", &[0.01, 0.03, 0.05], 0.0),
+    // A receiver that is off by less than a vehicle moves.
+    ("gnss-ramp", "coast+3", &[-1.0, -0.7, 0.7, 1.0, 2.0], 0.8),
 ];
 
 #[test]

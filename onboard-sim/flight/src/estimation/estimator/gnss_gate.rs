@@ -14,10 +14,10 @@ use crate::estimation::sensor_watch::FROZEN_IMU;
 
 /// Largest change of velocity between two fixes that no motion explains, m/s: late time tags and
 /// rounding.
-const UNEXPLAINED_M_S: f64 = 0.4;
+const UNEXPLAINED_M_S: f64 = 0.25;
 /// The same, in standard deviations of a velocity.
-const UNEXPLAINED_SIGMAS: f64 = 8.0;
-/// Error of the integrated specific force, as a share of the velocity gained: tilt and scale.
+const UNEXPLAINED_SIGMAS: f64 = 6.0;
+/// Error of the integrated specific force, as a share of it: tilt and scale.
 const GAINED_SHARE: f64 = 0.1;
 /// The same, as a share of the integral of the specific force's magnitude.
 const FORCE_SHARE: f64 = 0.05;
@@ -28,8 +28,9 @@ const UNEXPLAINED_M: f64 = 4.0;
 const MOVED_SHARE: f64 = 0.2;
 /// Conditions that end the quarantine: the receiver follows the motion, and is this close to the
 /// estimate, in velocity, m/s, position, m, and standard deviations of the estimate. After an
-/// outage of the complete ascent the estimated velocity is off by 0.3 m/s.
-const NEAR_M_S: f64 = 2.0;
+/// outage of the complete ascent the estimated velocity is off by 0.3 m/s. A receiver that is off
+/// by 1 m/s moves the estimated height as far from the true one as the barometer's scale permits.
+const NEAR_M_S: f64 = 0.8;
 const NEAR_M: f64 = 30.0;
 const NEAR_SIGMAS: f64 = 5.0;
 /// Conditions after an outage: a receiver quarantined after an outage of this length, s, and this
@@ -136,10 +137,12 @@ impl Estimator {
         let before = core::mem::replace(&mut gate.last, now);
         let had_fix = core::mem::replace(&mut gate.has_fix, true);
         let gained_m_s = now.gained_m_s - before.gained_m_s;
+        let fell_s = now.valid_at_s - before.valid_at_s;
+        let sensed_m_s = gained_m_s + Vector3::z() * (self.config.gravity_m_s2 * fell_s);
         let unexplained_m_s = (now.surplus_m_s() - before.surplus_m_s()).norm();
         let limit_m_s = UNEXPLAINED_M_S
             + UNEXPLAINED_SIGMAS * sigma_m_s
-            + GAINED_SHARE * gained_m_s.norm()
+            + GAINED_SHARE * sensed_m_s.norm()
             + FORCE_SHARE * core::mem::take(&mut gate.force_m_s)
             + AGE_ERROR_S * since.acceleration_m_s2.norm()
             + core::mem::take(&mut gate.shock_m_s);
