@@ -278,3 +278,32 @@ fn every_test_that_the_safety_page_names_exists() {
     let missing: Vec<&&str> = named.iter().filter(|name| !sources.contains(&format!("fn {name}("))).collect();
     assert!(missing.is_empty(), "no such tests: {missing:?}");
 }
+
+/// The README begins with its picture, then names what its readers search for, and stays short.
+#[test]
+fn the_readme_begins_with_the_words_that_its_readers_search_for() {
+    let readme = page("README.md");
+    let mut parts = readme.split("\n\n").skip(1);
+    assert!(parts.next().is_some_and(|part| part.starts_with("![")), "the picture is not first");
+    let first: String = parts.take(2).flat_map(|part| [part, "\n"]).collect();
+    let first = first.split_whitespace().collect::<Vec<_>>().join(" ");
+    for word in [
+        "flight computer",
+        "telemetry ground station",
+        "flight-log replay",
+        "MAVLink 2",
+        "UDP, TCP and serial",
+        "aerodynamic descent on four fins",
+        "landing burn by nonlinear model predictive control (NMPC)",
+        "20 times a second",
+        "ratatui",
+        "SSH",
+        "MCAP",
+        "Nothing has flown: all numbers are simulated.",
+    ] {
+        assert!(first.contains(word), "the first two paragraphs do not say `{word}`:\n{first}");
+    }
+    let is_prose = |line: &&str| !["|", "![", "```"].iter().any(|begin| line.starts_with(begin));
+    let words = readme.lines().filter(is_prose).flat_map(str::split_whitespace).count();
+    assert!(words < 500, "{words} words beside tables and pictures");
+}
