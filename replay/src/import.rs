@@ -8,7 +8,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use ardupilot_binlog::Reader;
 use flight::computer::messages::Severity;
 use flight::rules::phase::Phase;
@@ -16,7 +16,7 @@ use protocol::log::record::Record;
 use protocol::log::v1::Telemetry;
 use protocol::log::writer::LogHeader;
 use protocol::motion::Degrees;
-use px4_ulog::full_parser::{MultiId, SomeVec, read_file};
+use px4_ulog::full_parser::{Completeness, MultiId, SomeVec, read_file};
 use serde::Serialize;
 use sim::wire::record::text_event;
 
@@ -126,17 +126,25 @@ fn moving(
 
 /// The local position, with the attitude before each sample.
 fn px4(file: &Path) -> Result<Track> {
-    let parsed = read_file(file.to_str().context("its name is not UTF-8")?)?;
-    if parsed.completeness.is_incomplete() {
-        print_note(&format!("warning: {} is damaged: {:?}", file.display(), parsed.completeness));
-    }
+    let parsed = read_file(file.to_str().context("its name is not UTF-8")?).map_err(|error| {
+        // The parser's own errors are debug texts of any length.
+        let is_file_s = error.raw_os_error().is_some();
+        if is_file_s { error.into() } else { anyhow!("is no ULog file, or its definitions are damaged") }
+    })?;
+    let damage = match parsed.completeness {
+        Completeness::Complete => None,
+        Completeness::Truncated => Some("the file ends inside a record"),
+        Completeness::MalformedRecord(_) => {
+            Some("the file has a damaged record, and nothing after it was read")
+        }
+    };
     let column = |topic: &str, name: &str| -> Result<Vec<f64>> {
         let fields = parsed.messages.get(topic).and_then(|instances| instances.get(&MultiId::new(0)));
         Ok(match fields.and_then(|fields| fields.get(name)) {
             Some(SomeVec::Float(values)) => values.iter().map(|value| f64::from(*value)).collect(),
             Some(SomeVec::UInt64(values)) => values.iter().map(|value| *value as f64 / 1e6).collect(),
             Some(SomeVec::Bool(values)) => values.iter().map(|value| f64::from(u8::from(*value))).collect(),
-            _ => bail!("no {name} of {topic}"),
+            _ => bail!("no {name} of {topic}{}", damage.map(|why| format!("; {why}")).unwrap_or_default()),
         })
     };
     let times_s = column("vehicle_local_position", "timestamp")?;
@@ -163,7 +171,11 @@ fn px4(file: &Path) -> Result<Track> {
         };
         Telemetry { time_s, tilt_rad: tilt_rad(time_s), ..moving(here(&position), here(&velocity)) }
     };
-    Ok(Track { samples: times_s.into_iter().enumerate().map(sample).collect(), texts: Vec::new() })
+    let track = Track { samples: times_s.into_iter().enumerate().map(sample).collect(), texts: Vec::new() };
+    if let Some(damage) = damage {
+        print_note(&format!("warning: {}: {damage}", file.display()));
+    }
+    Ok(track)
 }
 
 /// The state of the first estimator, and the messages.
@@ -294,9 +306,9 @@ fn table(file: &Path) -> Result<Track> {
         let place = |name: &str| heads.iter().position(|(head, _)| head == name);
         let cell = |name: &str| row.get(place(name)?);
         if samples.is_empty() && row.len() < heads.len() {
-            let [values, heads] = [row.len(), heads.len()];
+            let (name, values, heads) = (file.display(), row.len(), heads.len());
             print_note(&format!(
-                "warning: line {line}: {values} values under {heads} heads: are they in place?"
+                "warning: {name}: line {line}: {values} values under {heads} heads: are they in place?"
             ));
         }
         let mut sample = Telemetry::default();
@@ -305,7 +317,7 @@ fn table(file: &Path) -> Result<Track> {
             let Some((name, text, size)) = found else { continue };
             let number = if separator == ',' { text.to_owned() } else { text.replace(',', ".") };
             let value: f64 =
-                number.parse().with_context(|| format!("line {line}, {name}: {text}: not a number"))?;
+                number.parse().with_context(|| format!("line {line}, {name}: {text:.40}: not a number"))?;
             if value.is_finite() {
                 set(&mut sample, size * value);
             }

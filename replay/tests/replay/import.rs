@@ -8,6 +8,8 @@ use replay::info::{GradeLevel, info};
 use replay::log::Recording;
 use replay::report::report;
 
+use crate::command_line::{replay, run};
+
 const TIMES: std::ops::Range<u16> = 0..40;
 
 /// Height of a flight of 4 s to 30 m, m.
@@ -71,8 +73,7 @@ fn val_hand_a_rocketpy_file() {
     assert!((last.tilt_rad.unwrap().to_degrees() - 10.0).abs() < 1e-9);
 }
 
-#[test]
-fn val_hand_an_ardupilot_file() {
+fn ardupilot_file() -> Vec<u8> {
     let padded = |text: &str, length: usize| {
         let mut bytes = text.as_bytes().to_vec();
         bytes.resize(length, 0);
@@ -100,7 +101,12 @@ fn val_hand_an_ardupilot_file() {
             }
         }
     }
-    let (flight, missing) = imported("00000042.BIN", &file);
+    file
+}
+
+#[test]
+fn val_hand_an_ardupilot_file() {
+    let (flight, missing) = imported("00000042.BIN", &ardupilot_file());
     assert!(missing.is_empty(), "{missing:?}");
     let last = flight.telemetry.last().unwrap();
     assert!((last.climb_m_s, last.north_m) == (Some(-3.0), Some(0.0)), "{last:?}");
@@ -265,4 +271,52 @@ fn what_is_wrong_with_a_file_is_named() {
         let error = format!("{:#}", import(&file, Path::new("/nonexistent/log.mcap")).unwrap_err());
         assert!(error.contains(wrong) && error.contains(name), "{name}: {error}");
     }
+}
+
+/// Each file cut, with a bit flipped, a byte lost or added, and a stretch of zeros, in 12 places:
+/// the import answers or fails, and any line about it names the file, is short and is no debug
+/// text.
+#[test]
+fn a_damaged_file_is_answered_in_short_sentences() {
+    const LONGEST: usize = 300;
+    let flights = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/replay/flights");
+    let real = |name: &str| std::fs::read(flights.join(name)).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let damages: [fn(&mut Vec<u8>, usize); 5] = [
+        Vec::truncate,
+        |bytes, at| bytes[at] ^= 0x10,
+        |bytes, at| {
+            bytes.remove(at);
+        },
+        |bytes, at| bytes.insert(at, b'7'),
+        |bytes, at| bytes.iter_mut().skip(at).take(512).for_each(|byte| *byte = 0),
+    ];
+    let mut failed = 0;
+    for (ending, bytes) in
+        [("ulg", real("px4.ulg")), ("csv", real("altos-telemetrum.csv")), ("bin", ardupilot_file())]
+    {
+        // The first third has the definitions.
+        let places =
+            (1..8).map(|place| place * bytes.len() / 24).chain((3..8).map(|place| place * bytes.len() / 8));
+        for (number, (at, damage)) in places.flat_map(|at| damages.map(|damage| (at, damage))).enumerate() {
+            let mut damaged = bytes.clone();
+            damage(&mut damaged, at);
+            let name = format!("{number}.{ending}");
+            let file = directory.path().join(&name);
+            std::fs::write(&file, damaged).unwrap();
+            let (code, stdout, stderr) =
+                run(replay("import", &file).arg(directory.path().join(format!("{name}.mcap"))));
+            assert!(
+                code == 0 && !stdout.is_empty() || code == 1 && !stderr.is_empty(),
+                "{name}: {code} {stderr}"
+            );
+            failed += code;
+            for line in stderr.lines() {
+                let begins = ["error: ", "replay: warning: "].iter().any(|begin| line.starts_with(begin));
+                let is_short = line.len() < LONGEST && !line.contains(['{', '}']);
+                assert!(begins && is_short && line.contains(&name), "{name}, at {at}: {line}");
+            }
+        }
+    }
+    assert!(failed > 10, "only {failed} files were refused");
 }
