@@ -229,13 +229,16 @@ pub struct Radius {
     /// The least radius that holds 99 % of these flights.
     pub holds_m: f64,
     /// Ends of the 95 % interval of the radius that holds 99 % of all flights there could be. Fewer
-    /// than 368 flights have no upper end.
+    /// than [`Radius::FEWEST`] flights have no upper end.
     pub low_m: f64,
     pub high_m: Option<f64>,
     pub farthest_m: f64,
 }
 
 impl Radius {
+    /// Fewest flights with an upper end: 0.99^368 is less than 0.025.
+    pub const FEWEST: u64 = 368;
+
     /// The radius of distances, m; `None` without any. The ends are order statistics: the number of
     /// n flights that come down inside the true radius is binomial (W. J. Conover, Practical
     /// Nonparametric Statistics, section 3.2), for any distribution of the distances.

@@ -13,7 +13,7 @@ use super::sheet::words_of;
 use crate::hazard::{Case, Impact, Radius, Rule, exclusion_m, landed_as_planned, lift_off_kg, widest};
 use crate::statistics::Landings;
 
-/// Fewest flights behind a stated rate or radius.
+/// Fewest flights behind a stated rate, and behind a radius without an upper end.
 pub const FEWEST: u64 = 100;
 /// Distance of the launch crew outside of the circle, m.
 const BESIDE_M: f64 = 10.0;
@@ -23,6 +23,9 @@ const BESIDE_M: f64 = 10.0;
 pub struct InWind {
     /// Mean wind 10 m above the ground.
     pub wind_m_s: f64,
+    /// Flights behind the rate, or else behind the radius, and how many are needed, where they are
+    /// too few.
+    pub too_few: Option<[u64; 2]>,
     /// How the flights as planned landed.
     pub landed: Option<Landings>,
     pub circle: Option<Circle>,
@@ -53,12 +56,16 @@ pub fn in_winds(flown: &[(f64, Vec<Impact>)], rule: &Rule) -> Vec<InWind> {
     let in_wind = |(wind_m_s, impacts): &(f64, Vec<Impact>)| {
         let landed = landed_as_planned(impacts);
         let enough = landed.stands.of >= FEWEST;
-        let widest = widest(impacts).filter(|(_, radius)| enough && radius.flights as u64 >= FEWEST);
+        let widest = widest(impacts);
+        let [rated, held] = [landed.stands.of, widest.map_or(0, |(_, radius)| radius.flights as u64)];
+        let too_few =
+            [[rated, FEWEST], [held, Radius::FEWEST]].into_iter().find(|[flown, needed]| flown < needed);
+        let widest = widest.filter(|_| enough && held >= FEWEST);
         let circle = widest.map(|(case, radius)| {
             least_m = least_m.max(exclusion_m(&radius, rule));
             Circle { exclusion_m: least_m, case, radius, farthest_m: farthest_m(impacts) }
         });
-        InWind { wind_m_s: *wind_m_s, landed: enough.then_some(landed), circle }
+        InWind { wind_m_s: *wind_m_s, too_few, landed: enough.then_some(landed), circle }
     };
     flown.iter().map(in_wind).collect()
 }

@@ -252,7 +252,6 @@ impl Card {
                 ("forbidden", forbidden.then(String::new)),
                 ("permitted_m_s", Some(PERMITTED_M_S.to_string())),
                 ("limit_m_s", limit_m_s.map(|limit_m_s| limit_m_s.to_string())),
-                ("fewest", Some(FEWEST.to_string())),
                 ("plan", plan.as_ref().map(|_| String::new())),
                 ("no_from", self.wind_from_deg.is_none().then(String::new)),
                 ("from_deg", degrees(0.0)),
@@ -357,14 +356,13 @@ fn wind_table(winds: &[InWind]) -> Section {
 /// Results of the flights in one wind, as a row.
 fn wind_row(wind: &InWind, may_fly: bool) -> Vec<String> {
     let or_too_few = |text: Option<String>| text.unwrap_or_else(|| "too few flights".to_owned());
-    let people = |circle: Circle| {
-        if !may_fly {
-            return ["DO NOT FLY".to_owned(), "-".to_owned()];
-        }
+    let [people, crew] = if let Some(circle) = wind.circle.filter(|_| may_fly) {
         let [exclusion_m, crew_m] = [circle.exclusion_m, circle.crew_m()];
         [format!("{exclusion_m:.0} m"), format!("{crew_m:.0} m, {:.0} min", libm::ceil(crew_m / 60.0))]
+    } else {
+        let why = wind.too_few.map(|[flown, needed]| format!(": too few flights ({flown}, {needed} needed)"));
+        [format!("DO NOT FLY{}", why.unwrap_or_default()), "-".to_owned()]
     };
-    let [people, crew] = wind.circle.map_or_else(|| ["none".to_owned(), "-".to_owned()], people);
     vec![
         format!("{} m/s", wind.wind_m_s),
         people,

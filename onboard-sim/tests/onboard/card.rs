@@ -117,6 +117,25 @@ fn circle(wind_m_s: f64, exclusion_m: f64) -> InWind {
     in_winds(&[(wind_m_s, impacts)], &rule()).remove(0)
 }
 
+/// Without enough flights for a rate and for the upper end of a radius nobody flies, and the card
+/// says how many are needed.
+#[test]
+fn too_few_flights_are_counted_and_give_no_wind_to_fly_in() {
+    for (flights, too_few) in [
+        (0, Some([0, 100])),
+        (1, Some([1, 100])),
+        (99, Some([99, 100])),
+        (100, Some([100, 368])),
+        (367, Some([367, 368])),
+        (368, None),
+    ] {
+        let impacts = (0..flights).map(|number| impact(Case::AsPlanned, number, 90.0, 0.0, true)).collect();
+        let winds = in_winds(&[(3.0, impacts)], &rule());
+        assert_eq!(winds[0].too_few, too_few, "{flights}");
+        assert_eq!(limit_m_s(&winds).is_none(), too_few.is_some(), "{flights}");
+    }
+}
+
 /// Also of circles that are close to each other.
 #[test]
 fn every_circle_is_named_whatever_the_direction_of_the_wind() {
@@ -278,7 +297,8 @@ fn a_card_is_reproduced_from_its_mission() {
     let [lit_m, chute_m] = [planned.ignition_m, planned.chute_down_to_m].map(Option::unwrap);
     assert!(15.0 < lit_m && lit_m < chute_m && chute_m < 150.0, "{planned:?}");
     for words in [
-        "Fewer than 100 flights were flown in each wind, or one did not come down: no radius, no rate",
+        "Too few flights were flown, or one did not come down: no radius, no rate",
+        "DO NOT FLY: too few flights (1, 100 needed)",
         "Lay the landing pad downwind of the rail: 7 m for each m/s of that wind.",
         &format!("as planned in the least wind {highest_m:.0} to {highest_m:.0} m"),
         "Thrust to weight at lift-off",
