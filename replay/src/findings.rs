@@ -42,16 +42,21 @@ pub(crate) fn is_warning(event: &EventRecord) -> bool {
     event.name == "vehicle" && event.level >= Level::Warning as i32
 }
 
-/// What the vehicle itself reported before its release, each once; all it reported if it was never
-/// released.
+/// How the vehicle's reports on a check that its crew runs begin.
+const OF_A_CHECK: &str = "check ";
+
+/// What the vehicle itself reported before its release, each once, but for what a check found: the
+/// crew flew after it. All it reported if it was never released.
 fn on_the_pad(recording: &Recording) -> Vec<Finding> {
     let (clock, zero_s, end_s) = match recording.clocks.flight_zero_s {
         Some(zero_s) => (Clock::Flight, zero_s, zero_s),
         None => (Clock::Log, 0.0, f64::INFINITY),
     };
     let mut facts: Vec<Finding> = Vec::new();
+    let is_of_flight = |event: &EventRecord| clock == Clock::Log || !event.message.starts_with(OF_A_CHECK);
     for (log_s, event) in recording.events.iter().filter(|(log_s, _)| *log_s < end_s) {
-        if is_warning(event) && facts.iter().all(|known| known.words != event.message) {
+        if is_warning(event) && is_of_flight(event) && facts.iter().all(|known| known.words != event.message)
+        {
             let words = event.message.clone();
             let since_s = log_s - zero_s;
             let follows = false;

@@ -321,6 +321,36 @@ fn a_frame_missing_in_the_log_is_no_identical_flight() {
     assert_eq!(FLOWN.verified_with(lost, |_| ()).outcome, Verification::Diverged);
 }
 
+/// The pin, and a check on the pad that passes, is ended or fails: all of them are the crew's, and
+/// a sound flight after them has no finding. A vehicle that stays on its pad has the reason as one.
+#[test]
+fn what_a_check_on_the_pad_finds_is_no_finding_of_the_flight() {
+    let by_hand = |frame, pin_out| Reached { request: None, pin_out, ..commanded(frame, CrewCommand::Hold) };
+    let checked = [by_hand(0, false), by_hand(400, true), commanded(800, CrewCommand::Check)];
+    let passes = (checked.to_vec(), &[][..], "check passed");
+    let ended = ([&checked[..], &[commanded(1_200, CrewCommand::EndCheck)]].concat(), &[][..], "ended early");
+    let fails = (checked.to_vec(), &["brown-out:4@pad+6"][..], "check FAILED");
+    for (crew, faults, words) in [passes, ended, fails] {
+        let released = [&crew[..], &armed_and_started(5_000)[1..]].concat();
+        for (crew, is_released) in [(released, true), (crew, false)] {
+            let flown = Flown::from(StartPoint::Pad, &crew, faults);
+            let log = flown.log();
+            let recording = replay::log::Recording::open(&log).unwrap();
+            let was_reported = recording.events.iter().any(|(_, event)| event.message.contains(words));
+            assert_eq!(was_reported, words != "check passed", "warnings alone are recorded here");
+            let found = replay::info::info(&log).unwrap().findings.unwrap();
+            let is_warning = !is_released && was_reported;
+            assert_eq!(
+                found.iter().any(|found| found.words.contains(words)),
+                is_warning,
+                "{words} {found:?}"
+            );
+            let is_sound = is_released && faults.is_empty();
+            assert!(!is_sound || found.is_empty(), "{words}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn a_vehicle_that_never_left_its_pad_verifies_and_counts_as_cut() {
     let flown = Flown::in_space(&[commanded(0, CrewCommand::Hold)], &[]);

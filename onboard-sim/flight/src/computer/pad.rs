@@ -311,8 +311,14 @@ impl Computer {
         let Some((why, untold)) = self.readiness.failing(&checks, self.table.time_s) else { return };
         let held = armed && self.hold(HoldCause::CheckFailed, || why);
         if untold && !held {
-            let (severity, state) =
-                if armed { (Severity::Critical, "armed, and ") } else { (Severity::Warning, "not ready: ") };
+            // The crew runs a check or has put the pin in: this is no fault of the vehicle.
+            let is_of_crew =
+                self.pad_check.is_busy(self.input.frame) || !self.table.mode().interlocks.pin_out;
+            let (severity, state) = match (armed, is_of_crew) {
+                (true, _) => (Severity::Critical, "armed, and "),
+                (false, true) => (Severity::Notice, "not ready: "),
+                (false, false) => (Severity::Warning, "not ready: "),
+            };
             self.table.report(severity, text!("{state}{why}"));
         }
     }
