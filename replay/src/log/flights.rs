@@ -217,13 +217,14 @@ impl Flights {
 }
 
 /// Sequence numbers of records, which show losses. MCAP leaves them to the writer: each channel has
-/// its counter, or all share one, or every number is 0.
+/// its counter, or all share one, or every number is 0. Numbers are signed: those of a counter that
+/// wraps in the log begin below 0.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sequences {
     channels: BTreeMap<u16, Numbers>,
-    last: Option<u32>,
+    last: Option<i64>,
     /// The smallest number: some writers count from 1.
-    smallest: Option<u32>,
+    smallest: Option<i64>,
     each_has_its_counter: bool,
     /// Records that are missing, if all share a counter.
     missing: u32,
@@ -232,10 +233,11 @@ pub(crate) struct Sequences {
 /// The numbers of a channel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Numbers {
-    next: u32,
+    first: i64,
+    next: i64,
     /// Records of all channels that were missing by then.
     missing: u32,
-    highest: u32,
+    highest: i64,
     records: u64,
 }
 
@@ -243,42 +245,47 @@ impl Sequences {
     /// Takes a record of a channel; returns how many records are missing since the last one of the
     /// channel: of it, or of all that share the counter.
     pub(crate) fn note(&mut self, channel: u16, sequence: u32) -> u32 {
-        self.each_has_its_counter |= self.last.is_some_and(|last| sequence <= last);
-        self.smallest = self.smallest.into_iter().chain([sequence]).min();
+        let number = i64::from(sequence.cast_signed());
+        let gap_after = |expected: i64| u32::try_from(number - expected).unwrap_or(0);
+        self.each_has_its_counter |= self.last.is_some_and(|last| number <= last);
+        self.smallest = self.smallest.into_iter().chain([number]).min();
         let first = self.first_number();
-        let of_all = self.last.map_or(first, |last| last.saturating_add(1));
-        self.missing = self.missing.saturating_add(sequence.saturating_sub(of_all));
-        self.last = Some(sequence);
-        let numbers = self.channels.entry(channel).or_default();
-        let before = *numbers;
-        *numbers = Numbers {
-            next: sequence.saturating_add(1),
+        let of_all = self.last.map_or(first, |last| last + 1);
+        self.missing = self.missing.saturating_add(gap_after(of_all));
+        self.last = Some(number);
+        let before = self.channels.get(&channel).copied();
+        let missing_before = before.map_or(0, |before| before.missing);
+        let numbers = Numbers {
+            first: before.map_or(number, |before| before.first),
+            next: number + 1,
             missing: self.missing,
-            highest: before.highest.max(sequence),
-            records: before.records + 1,
+            highest: before.map_or(number, |before| before.highest.max(number)),
+            records: before.map_or(0, |before| before.records) + 1,
         };
+        self.channels.insert(channel, numbers);
         if self.each_has_its_counter {
-            sequence.saturating_sub(before.next.max(first))
+            gap_after(before.map_or(first, |before| before.next))
         } else {
-            self.missing - before.missing
+            self.missing - missing_before
         }
     }
 
     /// The number from which the writer counts.
-    fn first_number(&self) -> u32 {
-        u32::from(self.smallest == Some(1))
+    fn first_number(&self) -> i64 {
+        i64::from(self.smallest == Some(1))
     }
 
     /// The number of missing records of a channel that has its counter.
     pub(crate) fn lost_of(&self, channel: u16) -> u64 {
-        let Numbers { highest, records, .. } = self.channels.get(&channel).copied().unwrap_or_default();
-        // A writer without numbering leaves 0 everywhere.
-        let numbered = if highest == 0 || self.is_shared() {
-            0
-        } else {
-            u64::from(highest) + 1 - u64::from(self.first_number())
+        let Some(Numbers { first, highest, records, .. }) = self.channels.get(&channel).copied() else {
+            return 0;
         };
-        numbered.saturating_sub(records)
+        // A writer without numbering leaves 0 everywhere.
+        if [first, highest] == [0, 0] || self.is_shared() {
+            return 0;
+        }
+        let numbered = highest + 1 - first.min(self.first_number());
+        numbered.unsigned_abs().saturating_sub(records)
     }
 
     /// The number of missing records.
@@ -344,6 +351,33 @@ mod tests {
             .collect()
     }
 
+    /// Logs of three channels whose counters wrap after 0, 1, ... records, each its own or all one:
+    /// an intact log has lost nothing, and one without its record `missing` that one.
+    #[test]
+    fn a_counter_that_wraps_has_lost_what_is_missing_and_nothing_else() {
+        const RECORDS: u32 = 30;
+        for (before_wrap, each_its_own) in
+            (1..=RECORDS).flat_map(|records| [(records, true), (records, false)])
+        {
+            let number = |at: u32| if each_its_own { at / 3 } else { at };
+            let begin = 0_u32.wrapping_sub(number(before_wrap).max(1));
+            let log = |missing: Option<u32>| {
+                let mut sequences = Sequences::default();
+                let records = (0..RECORDS).filter(|at| Some(*at) != missing);
+                let before: u32 = records
+                    .map(|at| sequences.note((at % 3) as u16, begin.wrapping_add(number(at))))
+                    .max()
+                    .unwrap_or_default();
+                (before, sequences.lost())
+            };
+            assert_eq!(log(None), (0, 0), "{before_wrap} {each_its_own}");
+            // Nothing shows the first and the last record of a channel.
+            for missing in 3..RECORDS - 3 {
+                assert_eq!(log(Some(missing)), (1, 1), "{before_wrap} {each_its_own} without {missing}");
+            }
+        }
+    }
+
     /// Two channels in turn, whose records count from 0 each, then together: one is lost.
     #[test]
     fn a_shared_counter_is_no_loss_and_its_gaps_are() {
@@ -372,6 +406,6 @@ mod tests {
         let mut second = FrameOrder::behind_another();
         assert_eq!((second.note(1, 600), second.note(2, 0)), (None, None));
         assert!(second.note(5, 3).is_some() && FrameOrder::behind_another().note(601, 0).is_some());
-        assert_eq!(gaps(&[(1, u32::MAX), (2, u32::MAX)]), [(0, 1)]);
+        assert_eq!(gaps(&[(1, i32::MAX as u32), (2, u32::MAX), (3, 0)]), [(0, 1)]);
     }
 }

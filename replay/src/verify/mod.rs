@@ -340,7 +340,8 @@ impl Answer for VerifyReport {
         lines.extend(obstacle.map(|obstacle| format!("not every frame was compared: {obstacle}")));
         let missing = self.what_is_missing();
         if self.outcome != Verification::IdenticalReadablePart && !missing.is_empty() {
-            lines.push(format!("what was compared is{missing}"));
+            let of_flight = format!("what was compared is{missing}");
+            lines.push(missing.strip_prefix("; ").map_or(of_flight, str::to_owned));
         }
         lines
     }
