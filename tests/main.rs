@@ -15,6 +15,7 @@ mod launch_day;
 mod links;
 mod log_states;
 mod logs;
+mod missing_files;
 mod outside_clients;
 mod pad_check;
 mod pages;

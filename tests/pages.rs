@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use e2e::{Program, Running, program};
 
 /// Our programs, as a page names them.
-const PROGRAMS: [(&str, Program); 3] =
+pub(crate) const PROGRAMS: [(&str, Program); 3] =
     [("ground", Program::Ground), ("onboard-sim", Program::OnboardSim), ("replay", Program::Replay)];
 
 /// Pages whose blocks are drawings, or about earlier releases.
@@ -99,7 +99,7 @@ fn every_command_on_a_page_is_understood_by_its_program() {
 }
 
 /// The commands that a help lists, without `help` itself.
-fn listed_commands(help: &str) -> Vec<String> {
+pub(crate) fn listed_commands(help: &str) -> Vec<String> {
     let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let names = lines.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
     names

@@ -40,7 +40,7 @@ pub struct Cli {
     pub station: StationArgs,
 
     /// Show a recorded flight (MCAP or .tlog) on the same screens instead; `last` is the newest
-    /// touchdown-*.mcap in the current directory.
+    /// touchdown-*.mcap in the current directory that has a vehicle.
     #[arg(long, value_name = "FILE|last", conflicts_with_all = ["connect", "log", "auto", "mission", "start", "seed", "speed"], help_heading = "Replay")]
     pub replay: Option<PathBuf>,
 

@@ -1,5 +1,6 @@
 //! Common parts of the three programs: exit codes, and alternative forms of their command lines.
 
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{self, Write as _};
 use std::ops::RangeInclusive;
@@ -7,7 +8,7 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgMatches, Args, ColorChoice, Command, Subcommand};
 use clap_complete::Shell;
 
@@ -90,18 +91,39 @@ pub fn is_quiet() -> bool {
 /// # Errors
 /// It is not understood, or asks for help or the version.
 pub fn read(program: Command) -> Result<ArgMatches, clap::Error> {
-    let words = std::env::args_os().filter_map(|word| word.into_string().ok());
-    let mut words = words.skip_while(|word| !word.starts_with("--color"));
+    let given: Vec<OsString> = std::env::args_os().collect();
+    let mut words =
+        given.iter().filter_map(|word| word.to_str()).skip_while(|word| !word.starts_with("--color"));
     let first = words.next().unwrap_or_default();
-    let when = first.strip_prefix("--color=").map(str::to_owned).or_else(|| words.next());
+    let when = first.strip_prefix("--color=").or_else(|| words.next());
     let color = when.and_then(|when| when.parse().ok()).unwrap_or_default();
     let name = program.get_name().to_owned();
     let program = program
         .mut_subcommand("completions", |its| its.after_help(format!("Example: {name} completions bash")))
         .mut_subcommand("man", |its| its.after_help(format!("Example: {name} man")));
-    let given = with_negative_numbers(program.color(color)).try_get_matches()?;
+    let mut program = with_negative_numbers(program.color(color));
+    let given = parsed(&mut program, &given)?;
     QUIET.store(given.get_flag("quiet"), Ordering::Relaxed);
     Ok(given)
+}
+
+/// Parses the words. An unknown command's error suggests every command that is one letter or one
+/// swap of two away: the likeness by which `clap` suggests has no result for `fyl`.
+fn parsed(program: &mut Command, words: &[OsString]) -> Result<ArgMatches, clap::Error> {
+    program.try_get_matches_from_mut(words).map_err(|mut error| {
+        let Some(ContextValue::String(unknown)) = error.get(ContextKind::InvalidSubcommand) else {
+            return error;
+        };
+        let parent =
+            words.iter().fold(&*program, |command, word| command.find_subcommand(word).unwrap_or(command));
+        let names = parent.get_subcommands().map(Command::get_name);
+        let near = names.filter(|name| strsim::osa_distance(name, unknown) == 1).map(str::to_owned);
+        let near: Vec<String> = near.collect();
+        if !near.is_empty() {
+            error.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(near));
+        }
+        error
+    })
 }
 
 /// Lets every option take a negative number, so that its error names the option and its range; an
@@ -175,7 +197,8 @@ impl Manual {
                     };
                     page = found;
                 }
-                clap_mangen::Man::new(page.clone()).render(&mut text)?;
+                let source = format!("{name} {}", program.get_version().unwrap_or_default());
+                clap_mangen::Man::new(page.clone()).source(source).render(&mut text)?;
             }
         }
         print(&text).map(|()| Exit::Yes)
@@ -216,6 +239,28 @@ mod tests {
         assert!(negative.starts_with(expected), "{negative}");
         let unknown = refused(&["program", "fly", "-5"]);
         assert!(unknown.starts_with("error: unexpected argument '-5' found"), "{unknown}");
+    }
+
+    /// A command with one letter too much, too little or wrong, or with two swapped, is suggested.
+    #[test]
+    fn a_mistyped_command_is_suggested_however_short_it_is() {
+        for (typed, meant) in
+            [("fyl", "fly"), ("fl", "fly"), ("flyy", "fly"), ("fiy", "fly"), ("cehck", "check")]
+        {
+            let config = Command::new("config").subcommands(["check", "fly"].map(Command::new));
+            let mut program = Command::new("program")
+                .subcommands(["fly", "check", "card"].map(Command::new))
+                .subcommand(config);
+            for before in [&["program"][..], &["program", "config"]] {
+                let words: Vec<OsString> = before.iter().chain([&typed]).map(OsString::from).collect();
+                let error = parsed(&mut program, &words).unwrap_err().to_string();
+                let expected = format!("a similar subcommand exists: '{meant}'");
+                assert!(error.contains(&expected), "{before:?} {typed}: {error}");
+            }
+        }
+        let mut program = Command::new("program").subcommand(Command::new("fly"));
+        let unlike = parsed(&mut program, &["program", "sail"].map(OsString::from));
+        assert!(!unlike.unwrap_err().to_string().contains("similar"));
     }
 
     #[test]

@@ -62,7 +62,7 @@ pub(crate) fn give(found: &impl Answer, json: bool) -> Result<Exit> {
 }
 
 /// Prints what is found of each file, the only one's as it is and those of several as a list. One
-/// that cannot be read does not hide the others.
+/// that cannot be read does not hide the others; if no file can be read, that is an error.
 pub(crate) fn give_each<A: Answer>(
     files: &[PathBuf],
     json: bool,
@@ -80,6 +80,7 @@ pub(crate) fn give_each<A: Answer>(
         }
     }
     let given = match all.as_slice() {
+        [] => return Ok(Exit::Error),
         [only] if files.len() == 1 => give(only, json)?,
         _ => give(&all, json)?,
     };

@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Context as _;
-use protocol::ftp::download::{Download, DownloadEvent, Progress};
+use protocol::ftp::download::{Download, DownloadEvent, GIVE_UP, Progress};
 use protocol::ftp::{Packet, crc};
 use protocol::log::recorder::{other_name, under_free_name};
+use protocol::program::is_quiet;
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::KeyRing;
@@ -38,6 +39,10 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
     let log_time = LogTime::Run(clock);
     let opened = Wire::open((us, vehicle), link.connect.clone(), key, clock, None, log_time).await;
     let mut wire = explained(opened, &link.connect).await?;
+    anyhow::ensure!(out.is_dir(), "--out {}: is no folder", out.display());
+    let links: Vec<String> = wire.endpoints().map(ToString::to_string).collect();
+    let (links, limit_s) = (links.join(", "), GIVE_UP.as_secs());
+    report(&format!("waiting for system {} on {links}, up to {limit_s} s", vehicle.system_id));
     // Another number every millisecond: its requests differ from those of an earlier download.
     let mut download = Download::new(name.as_deref(), (clock.start_unix_ns() >> 20) as u16);
     let mut partial: Option<PartialLog> = None;
@@ -56,7 +61,14 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         };
         let now = clock.now();
         for msg in msgs {
-            let Msg::Frame(frame) = msg else { continue };
+            let frame = match msg {
+                Msg::Frame(frame) => frame,
+                Msg::LinkDown(why) | Msg::LinkWarning(why) => {
+                    report(&why);
+                    continue;
+                }
+                _ => continue,
+            };
             let Some((target, packet)) = Packet::answer_in(&frame) else { continue };
             if target != us || frame.source() != vehicle {
                 continue;
@@ -82,9 +94,8 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
         if let Some(progress) = download.progress() {
             let tenths = 1 + 10 * u64::from(progress.bytes) / u64::from(progress.len.max(1));
             if tenths > std::mem::replace(&mut tenths_shown, tenths) {
-                // The download continues without a reader.
-                let (name, words) = (download.name().unwrap_or_default(), in_words(&progress));
-                let _ = writeln!(io::stderr(), "log {name}: {words}");
+                let name = download.name().unwrap_or_default();
+                report(&format!("log {name}: {}", in_words(&progress)));
             }
         }
         if let Some(ended) = download.ended() {
@@ -94,6 +105,13 @@ pub(in crate::app) async fn run_download(args: &DownloadArgs) -> anyhow::Result<
             print(format!("log {}\n", path.display()).as_bytes())?;
             return Ok(Exit::Yes);
         }
+    }
+}
+
+/// Reports what happens on the way. The download continues without a reader.
+fn report(words: &str) {
+    if !is_quiet() {
+        let _ = writeln!(io::stderr(), "{words}");
     }
 }
 

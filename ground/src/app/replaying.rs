@@ -25,16 +25,25 @@ const STEP: Duration = Duration::from_millis(100);
 /// Stands for the newest log in the current directory.
 const LAST: &str = "last";
 
-/// The newest log that has the usual name, which begins with its date.
-fn newest_log(folder: &Path) -> anyhow::Result<PathBuf> {
+/// The newest log that has the usual name, which begins with its date, and a flight to show. Newer
+/// ones are reported.
+fn newest_flight(folder: &Path, vehicle: Option<Address>) -> anyhow::Result<(PathBuf, Recording)> {
     let entries = std::fs::read_dir(folder).context("looking for the last log")?;
     let is_mcap = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "mcap");
-    let is_log = |name: &str| name.starts_with("touchdown-") && is_mcap(name);
-    let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
-    let newest = names.filter(|name| is_log(name)).max();
-    newest
-        .map(|name| folder.join(name))
-        .context("the current directory has no touchdown-*.mcap; give --replay a file")
+    let is_log = |name: &String| name.starts_with("touchdown-") && is_mcap(name);
+    let mut names: Vec<String> =
+        entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).filter(is_log).collect();
+    names.sort_unstable();
+    for name in names.iter().rev() {
+        let path = folder.join(name);
+        announce(&path);
+        match Recording::load(&path, vehicle) {
+            Ok(recording) => return Ok((path, recording)),
+            // Standard error may be closed.
+            Err(error) => drop(writeln!(std::io::stderr(), "ground: left out: {error:#}")),
+        }
+    }
+    anyhow::bail!("the current directory has no touchdown-*.mcap with a flight; give --replay a file")
 }
 
 /// Shows a recorded flight until the person at the screen quits; without a screen, prints its
@@ -49,10 +58,12 @@ pub async fn session(
     config: &Config,
     interactive: bool,
 ) -> anyhow::Result<Exit> {
-    let newest = (path == Path::new(LAST)).then(|| newest_log(Path::new("."))).transpose()?;
-    let path = newest.as_deref().unwrap_or(path);
-    announce(path);
-    let recording = Recording::load(path, vehicle)?;
+    let (path, recording) = if path == Path::new(LAST) {
+        newest_flight(Path::new("."), vehicle)?
+    } else {
+        announce(path);
+        (path.to_owned(), Recording::load(path, vehicle)?)
+    };
     let damage = recording.damage.clone();
     let mut player = Player::new(recording, settings(&path.display().to_string()));
     match from {
@@ -149,18 +160,26 @@ fn typed(player: &mut Player, msg: &Msg) -> Vec<Action> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use protocol::dialect::{HEARTBEAT_DATA, MavMessage};
+    use protocol::frame::Encoder;
+    use protocol::identity::VEHICLE;
 
     #[test]
-    fn the_newest_log_is_found_by_its_date() {
+    fn the_newest_log_with_a_vehicle_is_found_by_its_date() {
         let folder = tempfile::tempdir().unwrap();
-        let none = newest_log(folder.path()).unwrap_err().to_string();
-        assert_eq!(none, "the current directory has no touchdown-*.mcap; give --replay a file");
+        let found = || newest_flight(folder.path(), None);
+        let none = "the current directory has no touchdown-*.mcap with a flight; give --replay a file";
+        assert_eq!(found().unwrap_err().to_string(), none);
+        let write = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
+        write("touchdown-20261122-010203.mcap", b"");
+        assert_eq!(found().unwrap_err().to_string(), none);
+        let beat = Encoder::new(VEHICLE).encode(&MavMessage::HEARTBEAT(HEARTBEAT_DATA::default()));
+        let flight = [&1_000_000_u64.to_be_bytes(), beat.as_bytes()].concat().repeat(3);
         for name in
             ["touchdown-20261120-064030.mcap", "touchdown-20261121-010203.mcap", "other.mcap", "x.tlog"]
         {
-            std::fs::write(folder.path().join(name), "").unwrap();
+            write(name, &flight);
         }
-        let found = newest_log(folder.path()).unwrap();
-        assert_eq!(found.file_name().unwrap(), "touchdown-20261121-010203.mcap");
+        assert_eq!(found().unwrap().0.file_name().unwrap(), "touchdown-20261121-010203.mcap");
     }
 }

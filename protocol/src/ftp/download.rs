@@ -17,7 +17,7 @@ use super::packet::{DATA_LEN, Opcode, Packet, Refusal};
 /// answered.
 const RETRY_AFTER: Duration = Duration::from_millis(900);
 /// Time without an answer about files after which the download fails.
-const GIVE_UP: Duration = Duration::from_secs(30);
+pub const GIVE_UP: Duration = Duration::from_secs(30);
 /// Requests to close the file before it is left to the vehicle to close it.
 const CLOSE_TRIES: u32 = 3;
 /// Most pieces requested at once. A line of 57,600 baud carries them in 1.5 s, so it stays busy

@@ -180,36 +180,37 @@ impl LinkAddress {
 )]
 pub struct LinkAddressError {
     given: String,
-    problem: &'static str,
+    problem: String,
 }
 
 impl FromStr for LinkAddress {
     type Err = LinkAddressError;
 
     fn from_str(given: &str) -> Result<Self, LinkAddressError> {
-        let refuse = |problem| LinkAddressError { given: given.to_owned(), problem };
-        let (kind, rest) = given.split_once(':').ok_or_else(|| refuse("no kind of link"))?;
-        let (head, tail) =
-            rest.rsplit_once(':').ok_or_else(|| refuse("the part after the last colon is missing"))?;
-        if head.is_empty() {
-            return Err(refuse("the address is empty"));
-        }
-        let of_network = match kind {
-            "udpin" => Self::UdpIn,
-            "udpout" => Self::UdpOut,
-            "tcpin" => Self::TcpIn,
-            "tcpout" => Self::TcpOut,
-            "serial" => {
-                let baud = tail.parse().map_err(|_not_a_rate| refuse("the baud rate is not a number"))?;
-                if !(1_200..=4_000_000).contains(&baud) {
-                    return Err(refuse("the baud rate is not between 1200 and 4000000"));
-                }
-                return Ok(Self::Serial { path: head.to_owned(), baud });
-            }
-            _ => return Err(refuse("unknown kind of link")),
+        let refuse = |problem: String| LinkAddressError { given: given.to_owned(), problem };
+        let (kind, rest) = given.split_once(':').unwrap_or((given, ""));
+        let of_network: Option<fn(String) -> Self> = match kind {
+            "udpin" => Some(Self::UdpIn),
+            "udpout" => Some(Self::UdpOut),
+            "tcpin" => Some(Self::TcpIn),
+            "tcpout" => Some(Self::TcpOut),
+            "serial" => None,
+            _ => return Err(refuse(format!("`{kind}` is no kind of link"))),
         };
-        tail.parse::<u16>().map_err(|_not_a_port| refuse("the port is not a number from 0 to 65535"))?;
-        Ok(of_network(rest.to_owned()))
+        let parts = if of_network.is_some() { "an address and a port" } else { "a device and a baud rate" };
+        let (head, tail) = rest
+            .rsplit_once(':')
+            .filter(|(head, _)| !head.is_empty())
+            .ok_or_else(|| refuse(format!("{kind} needs {parts}")))?;
+        if let Some(of_network) = of_network {
+            let port = tail.parse::<u16>();
+            return port
+                .map(|_in_range| of_network(rest.to_owned()))
+                .map_err(|_not_a_port| refuse(format!("the port `{tail}` is not a number from 0 to 65535")));
+        }
+        let baud = tail.parse().ok().filter(|baud| (1_200..=4_000_000).contains(baud));
+        baud.map(|baud| Self::Serial { path: head.to_owned(), baud })
+            .ok_or_else(|| refuse(format!("the baud rate `{tail}` is not a number from 1200 to 4000000")))
     }
 }
 
@@ -364,19 +365,23 @@ mod tests {
 
     #[test]
     fn a_wrong_address_is_refused_with_the_valid_forms() {
-        for name in [
-            "",
-            "udpin",
-            "udpin:14550",
-            "udpin:host:x",
-            "tcp:host:1",
-            "tcpin:5760",
-            "serial:/dev/x",
-            "serial:/dev/x:9",
-            "serial::57600",
+        for (name, problem) in [
+            ("", "`` is no kind of link"),
+            ("127.0.0.1:24320", "`127.0.0.1` is no kind of link"),
+            ("/dev/ttyUSB0:57600", "`/dev/ttyUSB0` is no kind of link"),
+            ("[::1]:14550", "`[` is no kind of link"),
+            ("tcp:host:1", "`tcp` is no kind of link"),
+            ("udpin", "udpin needs an address and a port"),
+            ("udpin:14550", "udpin needs an address and a port"),
+            ("tcpin::5760", "tcpin needs an address and a port"),
+            ("udpin:host:x", "the port `x` is not a number from 0 to 65535"),
+            ("serial:/dev/x", "serial needs a device and a baud rate"),
+            ("serial::57600", "serial needs a device and a baud rate"),
+            ("serial:/dev/x:9", "the baud rate `9` is not a number from 1200 to 4000000"),
         ] {
             let error = name.parse::<LinkAddress>().unwrap_err().to_string();
-            assert!(error.contains("udpin:ADDRESS:PORT") && error.contains(name), "{error}");
+            let expected = format!("`{name}`: {problem}; write udpin:ADDRESS:PORT, ");
+            assert!(error.starts_with(&expected), "{error}");
         }
     }
 }

@@ -46,7 +46,7 @@ const SENT_AGAIN_AFTER: Duration = Duration::from_millis(500);
 /// Why a flight with a board has ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardError {
-    #[error("{}: {source}", path.display())]
+    #[error("{}: cannot be opened", path.display())]
     Pipe { path: PathBuf, source: io::Error },
     #[error("the board's pipes: {0}")]
     Pipes(#[from] io::Error),
