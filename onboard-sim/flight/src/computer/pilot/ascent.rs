@@ -543,9 +543,9 @@ mod tests {
     #[test]
     fn a_lift_off_without_pressure_is_rejected_on_the_pad_and_accepted_in_free_fall() {
         for (axial_m_s2, total_m_s2, denied_at_s) in [
-            (9.8, 9.8, Some(3.0)),  // It stands again.
+            (9.8, 9.8, Some(3.0)),   // It stands again.
             (19.6, 19.6, Some(2.4)), // The push outlasts the motor.
-            (0.2, 9.8, Some(20.0)), // It lies on its side.
+            (0.2, 9.8, Some(20.0)),  // It lies on its side.
             (-0.5, 0.6, None),
             (-2.5, 2.6, None),
         ] {
@@ -566,7 +566,8 @@ mod tests {
             }
             let rejected = events.iter().find(|(_, event)| *event == Event::NoLiftOff);
             assert_eq!(rejected.is_some(), denied_at_s.is_some(), "{axial_m_s2}: {events:?}");
-            let near = |(time_s, _): &(f64, Event)| denied_at_s.is_some_and(|at_s| (time_s - at_s).abs() < 0.5);
+            let near =
+                |(time_s, _): &(f64, Event)| denied_at_s.is_some_and(|at_s| (time_s - at_s).abs() < 0.5);
             assert!(rejected.is_none_or(near), "{axial_m_s2}: {rejected:?}");
             assert_eq!(watch.has_lifted_off(), denied_at_s.is_none());
         }
