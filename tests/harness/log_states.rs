@@ -64,10 +64,10 @@ pub fn log_states(intact: &[u8]) -> Vec<LogState> {
         ("head of the first record", MAGIC_BYTES + 4),
         ("head of a chunk's record", chunk.start + 4),
         ("fields of a chunk", chunk.start + HEAD_BYTES + 20),
-        ("compressed data", (chunk.start + chunk.end) / 2),
+        ("compressed data", usize::midpoint(chunk.start, chunk.end)),
         ("index of a chunk", chunk.end + 5),
         ("end mark of the data", log.data_end + 4),
-        ("summary", (log.data_end + intact.len()) / 2),
+        ("summary", usize::midpoint(log.data_end, intact.len())),
         ("footer", intact.len() - MAGIC_BYTES - 4),
         ("magic at the end", intact.len() - 3),
     ];
@@ -75,7 +75,7 @@ pub fn log_states(intact: &[u8]) -> Vec<LogState> {
         add(format!("cut in the {place}"), intact[..at].to_vec(), [log.messages(at); 2]);
     }
     // A hole begins in the middle of a chunk and ends in the same or in a later one.
-    let middle = (chunk.start + chunk.end) / 2;
+    let middle = usize::midpoint(chunk.start, chunk.end);
     for (name, bytes) in [("byte", 1), ("sector", 512), ("64 kB", 1 << 16)] {
         let until = (middle + bytes).min(log.chunks[log.chunks.len() - 3].end - 1);
         let broken = log.chunks.iter().filter(|chunk| chunk.start < until && chunk.end > middle);

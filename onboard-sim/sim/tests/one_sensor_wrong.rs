@@ -190,8 +190,8 @@ fn faults_of_recorded_sensors_are_survived() {
 }
 
 /// Faults too small for a monitor to reject, with sizes around its threshold: kind, moment, sizes
-/// in the sensor's unit, and the share of the vehicles that must stand. All others come down under the
-/// parachute or fall over slowly.
+/// in the sensor's unit, and the share of the vehicles that must stand. All others come down under
+/// the parachute or fall over slowly.
 const SMALL: &[(&str, &str, &[f64], f64)] = &[
     // A rattling leg or the igniter's pop looks like thrust before the motor ignites.
     ("accelerometer-spike", "ignition", &[200.0, 300.0, 500.0, 1000.0], 0.9),
