@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::covariance::POSITION;
+use super::covariance::{POSITION, VELOCITY};
 use super::health::BRIDGED_FRAMES;
 use super::{Estimator, GnssFix};
 use crate::estimation::sensor_watch::FROZEN_IMU;
@@ -31,8 +31,16 @@ const MOVED_SHARE: f64 = 0.2;
 /// outage of the complete ascent the estimated velocity is off by 0.3 m/s. A receiver that is off
 /// by 1 m/s moves the estimated height as far from the true one as the barometer's scale permits.
 const NEAR_M_S: f64 = 0.8;
+/// The same velocity if the quarantine began in the burn: there a spike of the accelerometer by 1 g
+/// has moved the estimate by 1.7 m/s.
+const NEAR_IN_BURN_M_S: f64 = 2.0;
 const NEAR_M: f64 = 30.0;
 const NEAR_SIGMAS: f64 = 5.0;
+/// Velocity gained by the specific force between two fixes, m/s, above which their change shows no
+/// small step, and the distance from the estimate, m/s, within which the receiver is admitted then:
+/// twice the estimate's error after the boost, which an accelerometer that is off by 0.05 g doubles.
+const PUSHED_M_S: f64 = 5.0;
+const PUSHED_NEAR_M_S: f64 = 1.5;
 /// Conditions after an outage: a receiver quarantined after an outage of this length, s, and this
 /// far from the estimate, m/s, must instead follow this change of velocity, m/s, which a frozen one
 /// cannot.
@@ -71,6 +79,8 @@ pub(super) struct GnssGate {
     pub(super) quarantined: bool,
     /// The quarantine began with the first fix after an outage.
     after_outage: bool,
+    /// It began while a motor burned.
+    in_burn: bool,
     /// Change of velocity that the last fixes have followed in a row, m/s.
     followed_m_s: f64,
     /// Integral of the specific force's magnitude since the last fix, m/s.
@@ -108,9 +118,9 @@ impl Estimator {
         self.gnss_gate.admitted_m_s
     }
 
-    /// Whether a fix may correct the estimate and vote on apogee.
-    pub(super) fn admits(&mut self, fix: &GnssFix) -> bool {
-        let admitted = self.follows_the_motion(fix);
+    /// Whether a fix may correct the estimate and vote on apogee; `burns`: a motor burns.
+    pub(super) fn admits(&mut self, fix: &GnssFix, burns: bool) -> bool {
+        let admitted = self.follows_the_motion(fix, burns);
         if admitted {
             self.gnss_gate.admitted_m_s = Some(fix.velocity_m_s);
         } else {
@@ -120,7 +130,7 @@ impl Estimator {
         admitted
     }
 
-    fn follows_the_motion(&mut self, fix: &GnssFix) -> bool {
+    fn follows_the_motion(&mut self, fix: &GnssFix, burns: bool) -> bool {
         let [lever_m, lever_m_s] = self.history.lever;
         let velocity_m_s = self.nominal.velocity_m_s + lever_m_s;
         let enough = fix.quality.satellites == 0 || fix.quality.satellites >= SATELLITES;
@@ -140,6 +150,7 @@ impl Estimator {
         let fell_s = now.valid_at_s - before.valid_at_s;
         let sensed_m_s = gained_m_s + Vector3::z() * (self.config.gravity_m_s2 * fell_s);
         let unexplained_m_s = (now.surplus_m_s() - before.surplus_m_s()).norm();
+        let pushed = gate.force_m_s > PUSHED_M_S;
         let limit_m_s = UNEXPLAINED_M_S
             + UNEXPLAINED_SIGMAS * sigma_m_s
             + GAINED_SHARE * sensed_m_s.norm()
@@ -151,22 +162,26 @@ impl Estimator {
         let stays = !had_fix || astray_m <= UNEXPLAINED_M + MOVED_SHARE * moved_m.norm();
         let repeated =
             had_fix && (now.position_m, now.velocity_m_s) == (before.position_m, before.velocity_m_s);
+        let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
+        let near_m_s = NEAR_SIGMAS * self.covariance.sigmas(VELOCITY).norm();
+        let near = !pushed || off_m_s <= near_m_s.max(PUSHED_NEAR_M_S);
         if core::mem::take(&mut gate.blind_frames) <= BRIDGED_FRAMES {
-            if unexplained_m_s <= limit_m_s && stays {
+            if unexplained_m_s <= limit_m_s && stays && near {
                 gate.followed_m_s += gained_m_s.norm();
             } else {
                 gate.followed_m_s = 0.0;
                 gate.after_outage = !gate.quarantined && now.valid_at_s - before.valid_at_s > OUTAGE_S;
+                gate.in_burn = if gate.quarantined { gate.in_burn } else { burns && !pushed };
                 gate.quarantined = true;
             }
         }
-        let off_m_s = (fix.velocity_m_s - velocity_m_s + since.gained_m_s).norm();
         let off_m = (fix.position_m - self.nominal.position_m - lever_m + since.moved_m).norm();
         let near_m = NEAR_M + NEAR_SIGMAS * self.covariance.sigmas(POSITION).norm();
         // After an outage the estimate may be far off, but a receiver that follows the motion
         // hardly ever is.
         let returns = gate.after_outage && gate.followed_m_s >= FOLLOWED_M_S && off_m_s > FAR_M_S;
-        if gate.followed_m_s > 0.0 && (off_m_s <= NEAR_M_S || returns) && off_m <= near_m {
+        let near_m_s = if gate.in_burn { NEAR_IN_BURN_M_S } else { NEAR_M_S };
+        if gate.followed_m_s > 0.0 && (off_m_s <= near_m_s || returns) && off_m <= near_m {
             gate.quarantined = false;
         }
         !gate.quarantined && !repeated

@@ -247,7 +247,7 @@ impl Estimator {
         if let Some(altitude_m) = measurements.pressure_altitude_m {
             self.take_barometer(altitude_m, &vehicle.levers.barometer_m);
         }
-        if let Some(fix) = measurements.gnss.filter(|fix| self.admits(fix)) {
+        if let Some(fix) = measurements.gnss.filter(|fix| self.admits(fix, vehicle.motor_burning)) {
             self.take_gnss(&fix);
         }
         if let Some(range_m) = measurements.lidar_range_m {
