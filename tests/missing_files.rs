@@ -135,8 +135,9 @@ fn a_missing_file_ends_every_command_with_1_and_is_named_once() {
     let mut rows = "time,height\n".to_owned();
     rows.extend((0..40).map(|row| format!("{row},{}\n", 400 - (row - 20) * (row - 20))));
     std::fs::write(folder.path().join("table.csv"), rows).expect("written");
-    let burn: String = (0..40).map(|row| format!("{},43\n", f64::from(row) * 0.17)).collect();
-    std::fs::write(folder.path().join("burn.csv"), format!("time_s,thrust_n\n{burn}")).expect("written");
+    let mut burn = "time_s,thrust_n\n".to_owned();
+    burn.extend((0..40).map(|row| format!("{},43\n", f64::from(row) * 0.17)));
+    std::fs::write(folder.path().join("burn.csv"), burn).expect("written");
     for line in ["onboard-sim keygen key", "replay import table.csv log.mcap"] {
         let made = run(line);
         assert_eq!(made.code, Some(0), "{line}: {}", made.output);

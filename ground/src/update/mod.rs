@@ -130,13 +130,7 @@ mod frame_bytes {
 
 /// Applies a message to the model and returns the tasks for the run loop.
 pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
-    // An acknowledgement is shown in the alarm.
-    let acknowledges = |key: &Key| Act::of_key(*key) == Some(Act::Acknowledge);
-    let is_answered = match &msg {
-        Msg::Keys(keys) => !keys.iter().all(acknowledges),
-        msg => matches!(msg, Msg::Report(_)),
-    };
-    let before = model.events.total();
+    let (is_answered, before) = (is_answered(&msg), model.events.total());
     match msg {
         Msg::Keys(keys) => keys::on_keys(model, &keys, now),
         Msg::Pasted => keys::on_paste(model, now),
@@ -240,16 +234,31 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             tick::on_tick(model, now);
         }
     }
-    // A command has a row of its own.
-    let is_sent = model.outbox.iter().any(|action| matches!(action, Action::Send(_)));
-    if is_answered && model.events.total() > before && !is_sent {
-        let answer = model.events.newest(1).next();
-        model.answer = answer.map(|event| (format!("{}{}", event.mark().trim_start(), event.text), now));
+    if is_answered {
+        note_answer(model, before, now);
     }
     vehicle_changes::watch_approach(model, now);
     alarms::watch(model, now);
     alarms::call_out(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+/// Whether the first event that a message causes answers a key of this screen. An acknowledgement
+/// is shown in the alarm.
+fn is_answered(msg: &Msg) -> bool {
+    match msg {
+        Msg::Keys(keys) => !keys.iter().all(|key| Act::of_key(*key) == Some(Act::Acknowledge)),
+        msg => matches!(msg, Msg::Report(_)),
+    }
+}
+
+/// Stores the newest event as the answer to a key. A command has a row of its own.
+fn note_answer(model: &mut Model, events_before: u64, now: Duration) {
+    let is_sent = model.outbox.iter().any(|action| matches!(action, Action::Send(_)));
+    if !is_sent && model.events.total() > events_before {
+        let answer = model.events.newest(1).next();
+        model.answer = answer.map(|event| (format!("{}{}", event.mark().trim_start(), event.text), now));
+    }
 }
 
 /// Records on an attached screen that its station runs.

@@ -165,7 +165,7 @@ fn a_countdown_whose_only_screen_does_not_answer_is_held_at_once() {
     rig.run(0.1);
     assert!(holds(&mut rig) > 0);
     let why = "screen 1, anna on pts/3 is not shown (tmux has no client)";
-    rig.expect_event(&format!("does not count: {why}"));
+    rig.expect_event(format!("does not count: {why}"));
     // The largest line gives the station's reason.
     rig.hold = TdHold::TD_HOLD_COMMANDED;
     rig.countdown_ms = i32::MAX;
