@@ -349,14 +349,14 @@ pub(super) fn perform(model: &mut Model, act: Act, now: Duration) {
                 Some(why) => model.warn(now, format!("cannot check: {why}")),
             },
         },
-        Act::RangeTest => match why_not_check(model, now) {
-            // The flight's page stays.
-            Some(why) => model.warn(now, format!("no radio range test: {why}")),
-            None => {
-                model.pages.hold(Some(Page::Checks));
-                request(model, Request::RangeTest, now);
+        Act::RangeTest => {
+            if let Some(why) = why_not_check(model, now) {
+                // The flight's page stays.
+                return model.warn(now, format!("no radio range test: {why}"));
             }
-        },
+            model.pages.hold(Some(Page::Checks));
+            request(model, Request::RangeTest, now);
+        }
         Act::Acknowledge => see_alarm(model, now),
         Act::Checklist if model.checklist.is_none() => model.info(now, "there is no checklist (--checklist)"),
         Act::Checklist => {

@@ -136,14 +136,7 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
         Msg::Pasted => keys::on_paste(model, now),
         Msg::Commanded(kind) => commands::submit(model, kind, Seat::default(), now),
         Msg::Requested { request, by } => requests::on_request(model, request, by, now),
-        Msg::Crew { seats, silent } => {
-            model.crew.set_seats(seats, silent, now);
-            let words = model.crew.words();
-            match model.crew.silence(&model.settings.seat).filter(|_| model.settings.demonstration) {
-                Some(why) => model.warn(now, format!("{why}: simulated, so it flies")),
-                None => model.info(now, words),
-            }
-        }
+        Msg::Crew { seats, silent } => on_crew(model, seats, silent, now),
         Msg::Checklist(list) => model.checklist = Some(*list),
         Msg::Report(Ok(path)) => model.info(now, format!("the report is written: {path}")),
         Msg::Report(Err(why)) => model.warn(now, format!("the report is not written: {why}")),
@@ -234,13 +227,21 @@ pub fn update(model: &mut Model, msg: Msg, now: Duration) -> Vec<Action> {
             tick::on_tick(model, now);
         }
     }
-    if is_answered {
-        note_answer(model, before, now);
-    }
+    note_answer(model, is_answered, before, now);
     vehicle_changes::watch_approach(model, now);
     alarms::watch(model, now);
     alarms::call_out(model, now);
     std::mem::take(&mut model.outbox)
+}
+
+/// Takes who can command, and the screens that do not count.
+fn on_crew(model: &mut Model, seats: Vec<Seat>, silent: Vec<(Seat, Silence)>, now: Duration) {
+    model.crew.set_seats(seats, silent, now);
+    let words = model.crew.words();
+    match model.crew.silence(&model.settings.seat).filter(|_| model.settings.demonstration) {
+        Some(why) => model.warn(now, format!("{why}: simulated, so it flies")),
+        None => model.info(now, words),
+    }
 }
 
 /// Whether the first event that a message causes answers a key of this screen. An acknowledgement
@@ -253,9 +254,9 @@ fn is_answered(msg: &Msg) -> bool {
 }
 
 /// Stores the newest event as the answer to a key. A command has a row of its own.
-fn note_answer(model: &mut Model, events_before: u64, now: Duration) {
+fn note_answer(model: &mut Model, is_answered: bool, events_before: u64, now: Duration) {
     let is_sent = model.outbox.iter().any(|action| matches!(action, Action::Send(_)));
-    if !is_sent && model.events.total() > events_before {
+    if is_answered && !is_sent && model.events.total() > events_before {
         let answer = model.events.newest(1).next();
         model.answer = answer.map(|event| (format!("{}{}", event.mark().trim_start(), event.text), now));
     }

@@ -99,6 +99,19 @@ fn box_around(points: &[(f64, f64)], least_m: f64) -> ((f64, f64), f64) {
         .unwrap_or(((0.0, 0.0), least_m))
 }
 
+/// Where the way to a vehicle on the ground begins, and where it stands, east and north of the pad,
+/// m. The page that leads there has one position and one way.
+fn way_over_ground(model: &Model, now: Duration) -> ((f64, f64), Option<(f64, f64)>) {
+    let vehicle = &model.vehicle;
+    let is_down = matches!(vehicle.phase_now(), Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
+    let flown = vehicle.flown.iter().last().filter(|_| is_down).map(|[north, east, _]| (*east, *north));
+    let finds = model.page() == Page::Find && model.chosen_tracker().is_none();
+    let sought = model.sought(now).filter(|place| finds && place.predicted.is_none());
+    let at = flown.map(|at| sought.map_or(at, |place| (place.received.east_m, place.received.north_m)));
+    let here = model.here().zip(vehicle.pad).filter(|_| finds).map(|(here, pad)| pad.to(here));
+    (here.map_or((0.0, 0.0), |(north_m, east_m)| (east_m, north_m)), at)
+}
+
 /// Draws the picture; both axes have the same scale.
 pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, area: Rect) {
     if area.width < 12 || area.height < 4 {
@@ -111,17 +124,7 @@ pub fn draw_map(model: &Model, theme: Theme, now: Duration, frame: &mut Frame, a
     let impact = impact_without_motor(model, now).filter(|_| down.is_some());
     let fence_m = vehicle.fence_m();
     let phase = vehicle.phase_now();
-    let stands = matches!(phase, Some(TdPhase::TD_PHASE_TOUCHDOWN | TdPhase::TD_PHASE_SAFED));
-    let stands = flown.last().copied().filter(|_| stands);
-    // The page that leads there has one position and one way.
-    let finds = model.page() == Page::Find && model.chosen_tracker().is_none();
-    let sought = model.sought(now).filter(|place| finds && place.predicted.is_none());
-    let stands =
-        stands.map(|at| sought.as_ref().map_or(at, |place| (place.received.east_m, place.received.north_m)));
-    let begin = model.here().zip(vehicle.pad).filter(|_| finds).map_or((0.0, 0.0), |(here, pad)| {
-        let (north_m, east_m) = pad.to(here);
-        (east_m, north_m)
-    });
+    let (begin, stands) = way_over_ground(model, now);
     let burns = phase.is_some_and(is_burning);
     let here = vehicle.best_motion().filter(|motion| motion.value.x_m.is_finite() && !motion.is_stale(now));
     let here = here.map(|motion| (motion.value.y_m, motion.value.x_m)).filter(|_| vehicle.in_flight());
