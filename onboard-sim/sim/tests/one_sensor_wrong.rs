@@ -199,6 +199,7 @@ const SMALL: &[(&str, &str, &[f64], f64)] = &[
     ("barometer-scale", "boost", &[0.01, 0.03, 0.05], 0.0),
     // A receiver that is off by less than a vehicle moves.
     ("gnss-ramp", "coast+3", &[-1.0, -0.7, 0.7, 1.0, 2.0], 0.8),
+    ("gnss-ramp", "coast", &[-2.0, 2.0], 0.8),
 ];
 
 #[test]
