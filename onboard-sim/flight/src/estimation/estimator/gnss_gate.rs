@@ -38,7 +38,8 @@ const NEAR_M: f64 = 30.0;
 const NEAR_SIGMAS: f64 = 5.0;
 /// Velocity gained by the specific force between two fixes, m/s, above which their change shows no
 /// small step, and the distance from the estimate, m/s, within which the receiver is admitted then:
-/// twice the estimate's error after the boost, which an accelerometer that is off by 0.05 g doubles.
+/// twice the estimate's error after the boost, which an accelerometer that is off by 0.05 g
+/// doubles.
 const PUSHED_M_S: f64 = 5.0;
 const PUSHED_NEAR_M_S: f64 = 1.5;
 /// Conditions after an outage: a receiver quarantined after an outage of this length, s, and this
