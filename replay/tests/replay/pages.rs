@@ -221,7 +221,7 @@ fn errors_of_the_estimate_are_drawn_in_every_direction_and_only_in_the_air() {
 /// The first screen names the cause with its number, and links to its picture.
 #[test]
 fn the_report_of_a_broken_flight_names_its_cause_first() {
-    let page = page_of(&fly(&["gimbal-jams:4@powered"]).log);
+    let page = page_of(&fly(&["gimbal-jams:4@ignition+0.25"]).log);
     let cause = "gimbal pitch 10.8 deg from where its commands take it, at 3.7 deg";
     has_in_order(
         &page,
