@@ -137,7 +137,8 @@ impl Case {
                 falls && matches!(effect, AbortEffect::Burn | AbortEffect::Impact { .. })
             }
             Self::AbortUnderThrust => {
-                phase == Phase::Powered
+                // The thrust is confirmed a quarter of a second after it has begun.
+                matches!(phase, Phase::Ignition | Phase::Powered)
                     && matches!(effect, AbortEffect::LandInPlace | AbortEffect::LandUpright)
             }
             _ => false,
