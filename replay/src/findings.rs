@@ -42,8 +42,9 @@ pub(crate) fn is_warning(event: &EventRecord) -> bool {
     event.name == "vehicle" && event.level >= Level::Warning as i32
 }
 
-/// How the vehicle's reports on a check that its crew runs begin.
-const OF_A_CHECK: &str = "check ";
+/// How the vehicle's reports begin on a check that its crew runs, and on what is not ready on the
+/// pad, as after such a check: a vehicle that was released was ready.
+const OF_THE_PAD: [&str; 2] = ["check ", "not ready: "];
 
 /// What the vehicle itself reported before its release, each once, but for what a check found: the
 /// crew flew after it. All it reported if it was never released.
@@ -53,10 +54,10 @@ fn on_the_pad(recording: &Recording) -> Vec<Finding> {
         None => (Clock::Log, 0.0, f64::INFINITY),
     };
     let mut facts: Vec<Finding> = Vec::new();
-    let is_of_flight = |event: &EventRecord| clock == Clock::Log || !event.message.starts_with(OF_A_CHECK);
+    let of_pad = |words: &str| clock != Clock::Log && OF_THE_PAD.iter().any(|on| words.starts_with(on));
     for (log_s, event) in recording.events.iter().filter(|(log_s, _)| *log_s < end_s) {
-        if is_warning(event) && is_of_flight(event) && facts.iter().all(|known| known.words != event.message)
-        {
+        let is_new = |words: &str| facts.iter().all(|known| known.words != words);
+        if is_warning(event) && !of_pad(&event.message) && is_new(&event.message) {
             let words = event.message.clone();
             let since_s = log_s - zero_s;
             let follows = false;
