@@ -28,6 +28,9 @@ use crate::model::Silence;
 /// Device status report (ECMA-48, 8.3.35), which every terminal answers.
 pub(super) const QUESTION: &[u8] = b"\x1b[5n";
 const ANSWER: &[u8] = b"\x1b[0n";
+/// Asks whether the terminal can distinguish a held key's repeats from presses (kitty's keyboard
+/// protocol, "Detection of support for this protocol"). crossterm drops the answer.
+pub(super) const FLAGS_QUESTION: &[u8] = b"\x1b[?u";
 /// How long the rest of an answer may take; a lone Escape waits for as long.
 const REST_WITHIN: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 /// How long the last answer may take when the screen ends: later it would be typed into the shell.
@@ -45,12 +48,10 @@ const TMUX_FORMAT: &str =
 /// When the last answer arrived that was not taken yet, and the number of open queries. There is
 /// only one terminal.
 static ANSWERED: Mutex<Option<Duration>> = Mutex::new(None);
-/// Asks whether the terminal can distinguish a held key's repeats from presses (kitty's keyboard
-/// protocol, "Detection of support for this protocol"). crossterm drops the answer.
-pub(super) const FLAGS_QUESTION: &[u8] = b"\x1b[?u";
-static REPORTS_FLAGS: AtomicBool = AtomicBool::new(false);
 static OPEN_QUESTIONS: AtomicI32 = AtomicI32::new(0);
-/// tmux reports that it does not show the screen.
+/// The terminal has answered [`FLAGS_QUESTION`].
+static REPORTS_FLAGS: AtomicBool = AtomicBool::new(false);
+/// Why tmux does not show the screen.
 static HIDDEN: Mutex<Option<Silence>> = Mutex::new(None);
 
 /// The original standard input, and our end of the pseudo-terminal that replaces it.

@@ -116,9 +116,9 @@ impl Records {
                 break;
             }
             // The sizes in a chunk's fields; if they are wrong, its content fails its checksum.
-            let fields = if opcode == op::CHUNK { OVERLAP_BYTES as u64 } else { 0 };
-            let fields = ChunkHead::read(&self.read(end_of_head, fields)?);
-            let length = fields.map_or(stated, |chunk| chunk.body_bytes);
+            let fields = (opcode == op::CHUNK).then(|| self.read(end_of_head, OVERLAP_BYTES as u64));
+            let chunk = fields.transpose()?.and_then(|fields| ChunkHead::read(&fields));
+            let length = chunk.map_or(stated, |chunk| chunk.body_bytes);
             if opcode == 0 || length > self.size - end_of_head {
                 let reason = if opcode == 0 {
                     "no record begins here"
